@@ -5,6 +5,7 @@ Runs that are done (results/cars/NAME-SEED.json) are kept; `--again` trains them
 side, each on a core of its own.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -48,7 +49,7 @@ def main(
     path = write_page(there)
     write_all(RUNS, [result for runs in there.values() for result in runs])
     console.print(f"wrote {path}")
-    _publish()
+    _publish(there)
     for name in failed:
         console.print(f"[red]failed[/red] {name}: see {RESULTS / name}.log")
     raise typer.Exit(1 if failed else 0)
@@ -63,12 +64,21 @@ def results() -> dict[str, list[Result]]:
     return found
 
 
-def _publish() -> None:
-    """Puts the first seed's policies of the headline into policies/pretrained/."""
+def _publish(there: dict[str, list[Result]]) -> None:
+    """Puts policies of the headline into policies/pretrained/."""
     for experiment in SECTIONS[0].experiments:
-        trained = RESULTS / f"{experiment.name}-1.pt"
+        trained = RESULTS / f"{experiment.name}-{shipped_seed(experiment, there.get(experiment.name, ()))}.pt"
         if trained.exists():
             write_whole(PRETRAINED / f"{experiment.name}.pt", trained.read_bytes())
+
+
+def shipped_seed(experiment: Experiment, runs: Sequence[Result]) -> int:
+    """The seed whose policy ships: the one that did best where the experiment says so, or the first."""
+    for k, judged in enumerate(experiment.judged):
+        if judged.chooses and runs:
+            found = [(result.evaluations[k].successes, -result.seed) for result in runs]
+            return -max(found)[1]
+    return 1
 
 
 def _is_of(path: Path, name: str) -> bool:

@@ -10,6 +10,8 @@ class Judged:
 
     label: str
     settings: dict[str, Any] = field(default_factory=dict)  # of the task, over those of the recipe
+    episodes: int = 1000
+    chooses: bool = False  # by these the seed is chosen whose policy ships: the one whose interval begins highest
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,3 +32,4 @@ class Experiment:
 
 
 NEW_SPOTS = Judged("new spots", {"split": "test"})
+VALIDATION = Judged("validation spots", {"split": "validation"}, episodes=4000, chooses=True)

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Literal
 
 from common.files import write_whole
 
@@ -15,7 +16,7 @@ class Point:
     """One point of a training curve, over the episodes that ended since the last."""
 
     steps: int
-    wall_s: float
+    wall_s: float  # by the run's clock
     success: float
     reward: float
 
@@ -39,12 +40,14 @@ class Result:
     experiment: str
     seed: int
     steps: int
-    train_s: float  # wall clock of training, kernels compiled before
+    train_s: float  # of training by the run's clock, kernels compiled before
     threads: int
     machine: str
     policy_bytes: int
     curve: list[Point]
     evaluations: list[Evaluated]
+    clock: Literal["wall", "processor"] = "wall"
+    """`processor`: time of the processor, which other work on the machine does not lengthen."""
 
     @property
     def steps_per_s(self) -> float:

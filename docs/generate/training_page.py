@@ -98,7 +98,8 @@ def _section(title: str, block: type[BaseModel]) -> str:
     for key, schema in block.model_json_schema()["properties"].items():
         star = " *" if schema.get("is_own") else ""
         default = "required" if key in required else _default(schema)
-        rows.append(f"| {key}{star} | {default} | {_values(schema)} | {schema.get('description', '')} |")
+        meaning = " ".join(schema.get("description", "").split())
+        rows.append(f"| {key}{star} | {default} | {_values(schema)} | {meaning} |")
     return "\n".join(rows) + "\n\n"
 
 

@@ -15,14 +15,17 @@ import torch
 
 from common.clock import wall_time_s
 from policies.learn import checkpoint
+from policies.learn.best_policy import BestPolicy
 from policies.learn.build_learner import build_learner, remarks
 from policies.learn.checkpoint_compatibility import flat, require_fit, settings_that_must_fit
+from policies.learn.config.network import NetworkSettings
 from policies.learn.config.run import RunConfig
 from policies.learn.curriculum import Curriculum, RecentEpisodes
 from policies.learn.evaluate import Evaluation
 from policies.learn.export.onnx_export import ParityError, export_policy
 from policies.learn.export.policy_file import CHECKPOINT, POLICY, PolicyCard, policy_record, save_policy
 from policies.learn.export.policy_path import CheckpointError
+from policies.learn.networks.policy import Policy
 from policies.learn.success_target import SuccessTarget
 from policies.learn.torch_threads import few_threads
 from policies.learn.training_curves import EventFile, Period
@@ -144,6 +147,7 @@ class Training:
         fraction = self.behavior.success_target
         self._target = SuccessTarget(fraction, self.task_name, self.task_settings) if fraction is not None else None
         self._judged: Evaluation | None = None
+        self._best = BestPolicy()
         self._moments: deque[tuple[float, int]] = deque(maxlen=_RATE_ITERATIONS + 1)
         if newest is not None and content is not None:
             self._restore(newest, content)
@@ -210,6 +214,8 @@ class Training:
             if self._judged is not None:
                 values["Environment/Judged Success Rate"] = self._judged.success_rate
                 is_reached = self._target.is_reached(self._judged)
+                if self.behavior.keep_best:
+                    self._best.offer(self.learner.policy, self._card(), self._judged)
         self._events.write(self.learner.steps, values)
         return is_reached
 
@@ -238,23 +244,27 @@ class Training:
             "events": self._events.position(),
             "elapsed_s": progress.elapsed_s,
             "saved": self._saved,
+            "best": self._best.state(),
         }
         checkpoint.save(path, content, CHECKPOINT)
-        self._export(path.with_suffix(".onnx"))
+        self._export(path.with_suffix(".onnx"), self.learner.policy)
         self.folder.write_status(self._status())
         checkpoint.prune(self.folder.training, self.folder.behavior, self.behavior.keep_checkpoints)
 
     def _finish(self, end: str) -> Result:
         """Writes the trained policy."""
-        save_policy(self.folder.policy, self.learner.policy, self._card())
-        self._export(self.folder.network)
+        policy, card, judged = self.learner.policy, self._card(), self._judged
+        if self._best.judged is not None:
+            (policy, card), judged = self._best.restored(), self._best.judged
+        save_policy(self.folder.policy, policy, card)
+        self._export(self.folder.network, policy)
         self.folder.write_status(self._status() | {"end": end})
-        return Result(end, self._progress(), self._judged, self.folder.policy, self.folder.network)
+        return Result(end, self._progress(), judged, self.folder.policy, self.folder.network)
 
-    def _export(self, path: Path) -> None:
+    def _export(self, path: Path, policy: Policy) -> None:
         """The policy as an ONNX network. Hours of training are not given up where rounding drives the two apart."""
         try:
-            export_policy(self.learner.policy, path)
+            export_policy(policy, path)
         except ParityError as error:
             self.watcher.note(f"{error}; it was not written")
 
@@ -313,6 +323,8 @@ class Training:
         self._events_position = content["events"]
         self._elapsed_before_s = content["elapsed_s"]
         self._saved = content["saved"]
+        if "best" in content:  # not in checkpoints of before there was one
+            self._best.load_state(content["best"])
 
     def _initialize(self, path: Path) -> None:
         """Starts from the networks of another run."""
@@ -326,7 +338,7 @@ class Training:
 
 def _network(policy: Mapping[str, Any]) -> dict[str, Any]:
     """What must be the same for the weights of one policy to fit into another."""
-    settings = {key: value for key, value in policy["network"].items() if key != "deterministic"}
+    settings = NetworkSettings.model_validate(policy["network"]).model_dump(exclude={"deterministic"})
     return {"trainer_type": "sac" if policy["is_squashed"] else "ppo", **flat(settings, "network_settings.")}
 
 

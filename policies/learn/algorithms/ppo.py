@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from policies.learn.algorithms import ppo_losses
 from policies.learn.algorithms.gae import advantages, cut_at_horizon
 from policies.learn.algorithms.learner import Companion, Iteration, load_if_fitting, means
-from policies.learn.algorithms.schedule import BETA_FLOOR, EPSILON_FLOOR, RATE_FLOOR, scheduled
+from policies.learn.algorithms.schedule import BETA_FLOOR, EPSILON_FLOOR, RATE_FLOOR, scheduled, sharpened
 from policies.learn.config.behavior import Behavior, PpoHyperparameters
 from policies.learn.networks.action_distributions import CLIP
 from policies.learn.networks.networks import Body, Critic, policy_body, privileged_body
@@ -85,7 +85,8 @@ class Ppo:
     def iterate(self) -> Iteration:
         """Collects, estimates and learns once."""
         rollout = self._rollout
-        self._is_warming_up = self.steps < self.hyperparameters.critic_warm_up
+        before = self.steps
+        self._is_warming_up = before < self.hyperparameters.critic_warm_up
         self._collect(rollout)
         self.steps += rollout.rewards.numel()
         has_learned_signals = any(not isinstance(signal, ExtrinsicSignal) for signal in self.signals)
@@ -94,6 +95,8 @@ class Ppo:
         statistics = self._estimate(rollout, rewards) | self._improve(rollout, transitions)
         if self.cloning is not None and not self._is_warming_up:
             statistics |= self.cloning.update(self.steps)
+        most = self.behavior.max_steps
+        self.policy.heads.sharpen(sharpened(self.hyperparameters.sharpening, before / most, self.steps / most))
         return Iteration(rollout.rewards.numel(), self.task.task.take_scores(), statistics)
 
     def restart(self) -> None:

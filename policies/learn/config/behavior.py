@@ -82,6 +82,9 @@ class PpoHyperparameters(HyperparametersBase):
     """An update ends early when the policy has moved this far (mean KL); none: never."""
     normalize_returns: bool = own_key(False)
     """Whether critics learn returns divided by their running deviation."""
+    sharpening: Positive = own_key(1.0)
+    """By how much the logits of discrete choices are scaled up between 50 % and 75 % of max_steps: from there on it is
+    nearly the most probable choices that are learned from; 1: not at all."""
     joint_ratio: bool = own_key(False)
     """Whether the ratio is of the whole action, not of each branch and dimension by itself."""
     normalize_advantages: Literal["buffer", "minibatch", "none"] = own_key("buffer")
@@ -211,6 +214,8 @@ class Behavior(Block):
     """Whose networks this one starts from: a policy file or checkpoint, a run, or the name of one that ships."""
     success_target: FractionOrNone = own_key(None)
     """Training ends when this fraction of episodes succeeds; none: at max_steps only."""
+    keep_best: bool = own_key(False)
+    """Whether the trained policy is the one that did best when it was held against success_target, not the last."""
 
     @field_validator("self_play", mode="before")
     @classmethod
@@ -227,6 +232,12 @@ class Behavior(Block):
         if isinstance(raw, HyperparametersBase) and not isinstance(raw, kind):
             raise ValueError(f"are those of another trainer than {info.data['trainer_type']}")
         return kind.model_validate(raw)
+
+    @model_validator(mode="after")
+    def _best_is_told(self) -> Self:
+        if self.keep_best and self.success_target is None:
+            raise ValueError("keep_best: takes a success_target, against which policies are held")
+        return self
 
     @model_validator(mode="after")
     def _sequences_fit(self) -> Self:

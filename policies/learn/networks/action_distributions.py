@@ -105,6 +105,13 @@ class ActionHeads(nn.Module):
             log_sigma = empty if self.log_sigma is None else self.log_sigma
         return ActionDistribution(mean, log_sigma, self._choice_logs(features))
 
+    @torch.no_grad()
+    def sharpen(self, factor: float) -> None:
+        """Scales the logits of the discrete choices: draws come nearer to the most probable ones, which stay."""
+        if self.logits is not None:
+            self.logits.weight.mul_(factor)
+            self.logits.bias.mul_(factor)
+
     def _choice_logs(self, features: Tensor) -> Tensor:
         """Log-probabilities, shape (..., branches, choices of the largest branch)."""
         if self.logits is None:

@@ -46,7 +46,6 @@ wp.set_module_options({"enable_backward": False})
 
 _AS_DOCUMENTED, _PROGRESS = wp.constant(AS_DOCUMENTED), wp.constant(PROGRESS)
 _SPOT_HEIGHT, _BLOCK_HEIGHT = wp.constant(SPOT_HEIGHT), wp.constant(BLOCK_HEIGHT)
-_SPOT_COUNT = wp.constant(len(LEVEL1_SPOTS))
 _GOAL_STREAM, _START_STREAM, _YAW_STREAM, _BLOCK_STREAM = (wp.constant(stream) for stream in (1, 2, 3, 4))
 
 PRESETS = {
@@ -180,7 +179,7 @@ def place_goal(
         position = positions.marker
     else:
         rng = draw_key(buffers.seed[i], i, episode, _GOAL_STREAM)
-        position = positions.spots[wp.randi(rng, 0, _SPOT_COUNT)]
+        position = positions.spots[wp.randi(rng, 0, positions.spots.shape[0])]
     cars.goal[i] = pose_at(position, wp.radians(cars.params[i].goal_yaw_deg))
 
 
@@ -300,15 +299,16 @@ class Parking1(ParkingTask):
         blocks = Blocks()
         blocks.poses = self.blocks
         blocks.params = typed_rows(self.buffers.params, Level1Params, first=len(CAR_PARAMS))
-        self._record(begin, step, [rules, self._positions(settings.split), self.world, blocks])
+        self._record(begin, step, [rules, self._positions(settings), self.world, blocks])
 
-    def _positions(self, split: str) -> Any:
+    def _positions(self, settings: ParkingSettings) -> Any:
         positions = Level1Positions()
         positions.start = wp.vec4(*pose(LEVEL1_START))
         positions.start_yaw = float(np.radians(LEVEL1_START[2]))
         poses = [pose(position) for position in BLOCK_POSITIONS]
         positions.blocks = wp.mat44(*np.vstack([*poses, np.zeros(4)]).ravel())
         positions.marker = wp.vec2(*LEVEL1_MARKER)
-        positions.spots = wp.array(np.array(LEVEL1_SPOTS, dtype=np.float32), dtype=wp.vec2, device=self.device)
-        positions.cells = wp.array(cells(0, 1, split), dtype=wp.vec2, device=self.device)
+        spots = LEVEL1_SPOTS[1:2] if settings.goals == "one" else LEVEL1_SPOTS  # where the scene's marker stands
+        positions.spots = wp.array(np.array(spots, dtype=np.float32), dtype=wp.vec2, device=self.device)
+        positions.cells = wp.array(cells(0, 1, settings.split, settings.quarter), dtype=wp.vec2, device=self.device)
         return positions

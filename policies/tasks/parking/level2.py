@@ -324,7 +324,7 @@ class Parking2(ParkingTask):
             branches=BRANCHES[choices.actions],
             stack=settings.stack or STACKS[settings.preset],
         )
-        storey = settings.storey or ("2" if choices.goals == "published" else "both")
+        storey = settings.storey or ("both" if choices.goals == "anywhere" else "2")
         defaults = {
             **reward_defaults(choices, 2),
             **_PRESET_PARAMS[settings.preset],
@@ -338,9 +338,9 @@ class Parking2(ParkingTask):
         movers.poses = self.movers
         movers.touching = self._zeros("touching", (env_count, 2), int)
         movers.params = typed_rows(self.buffers.params, Level2Params, first=len(CAR_PARAMS))
-        self._record(begin, step, [rules, self._positions(settings.split), self.world, movers])
+        self._record(begin, step, [rules, self._positions(settings), self.world, movers])
 
-    def _positions(self, split: str) -> Any:
+    def _positions(self, settings: Parking2Settings) -> Any:
         def points(of: Any) -> Any:
             return wp.array(np.array(of, dtype=np.float32), dtype=wp.vec2, device=self.device)
 
@@ -354,6 +354,9 @@ class Parking2(ParkingTask):
         )
         exits = [(x, z, np.radians(yaw_deg)) for x, z, yaw_deg in PORTAL_EXITS]
         positions.exits = wp.mat33(*np.ravel([*exits, (0.0, 0.0, 0.0)]))
-        positions.spots_1, positions.spots_2 = points(LEVEL2_SPOTS_BELOW), points([LEVEL2_SPOT])
-        positions.cells_1, positions.cells_2 = points(cells(0, 2, split)), points(cells(1, 2, split))
+        below = LEVEL2_SPOTS_BELOW[:1] if settings.goals == "one" else LEVEL2_SPOTS_BELOW
+        positions.spots_1, positions.spots_2 = points(below), points([LEVEL2_SPOT])
+        positions.cells_1, positions.cells_2 = (
+            points(cells(storey, 2, settings.split, settings.quarter)) for storey in (0, 1)
+        )
         return positions

@@ -18,6 +18,7 @@ wp.set_module_options({"enable_backward": False})
 ObservationKind = Literal["", "as-documented", "as-coded", "ranged"]
 RewardKind = Literal["", "as-documented", "as-documented-gail", "as-coded", "progress"]
 Positions = Literal["", "published", "anywhere"]
+Goals = Literal["", "published", "one", "anywhere"]
 Success = Literal["", "touch", "pose"]
 Actions = Literal["", "steer", "push-or-turn", "steer-and-drive", "steer-and-shift"]
 Repeat = Literal["", "once", "held"]
@@ -46,15 +47,20 @@ _ACTIONS = {
 class ParkingSettings(TaskSettings):
     """Of both levels."""
 
+    split: Literal["train", "validation", "test"] = "train"  # type: ignore[assignment]  # others have no `validation`
+    """`train`, `test`, or `validation`, by which to choose among policies: disjoint sets of places of goals."""
+    quarter: int = Field(default=0, ge=0, le=4)
+    """Which quarter of each storey the test places are: 1 (low x and z), 2 (high x), 3 (high z), 4 (high x and z); 0:
+    cells all over it."""
     observation: ObservationKind = ""
     """`as-documented` and `as-coded`: unit vectors without ranges; `ranged`: what is where in the car's frame."""
     reward: RewardKind = ""
     """The documents' table (PPO column, PPO+GAIL column, or as the code applies it), or `progress`: ours."""
     starts: Positions = ""
     """The `published` pose, or `anywhere` free, with any yaw."""
-    goals: Positions = ""
-    """`published` places, or `anywhere` free in the cells of the chosen split. Published places are training spots:
-    where nothing is chosen here, `split=test` draws from the test cells."""
+    goals: Goals = ""
+    """`published` places, `one` of them, or `anywhere` free in the cells of the chosen split. Published places are
+    training spots: where nothing is chosen here, the other splits draw from their cells."""
     obstacles: Positions = ""
     """Blocks and moving obstacles at their `published` places, or `anywhere`, others in each episode."""
     success: Success = ""
@@ -95,7 +101,7 @@ class Choices:
     observation: ObservationKind
     reward: RewardKind
     starts: Positions
-    goals: Positions
+    goals: Goals
     obstacles: Positions
     success: Success
     actions: Actions
@@ -106,12 +112,12 @@ class Choices:
 
 
 def chosen(settings: ParkingSettings, preset: Choices) -> Choices:
-    """The preset's options where the user chose none; but test goals are never the published ones by themselves."""
+    """The preset's options where the user chose none; but held-out goals are never the published ones by themselves."""
     return Choices(
         observation=settings.observation or preset.observation,
         reward=settings.reward or preset.reward,
         starts=settings.starts or preset.starts,
-        goals=settings.goals or ("anywhere" if settings.split == "test" else preset.goals),
+        goals=settings.goals or (preset.goals if settings.split == "train" else "anywhere"),
         obstacles=settings.obstacles or preset.obstacles,
         success=settings.success or preset.success,
         actions=settings.actions or preset.actions,

@@ -1,8 +1,10 @@
-"""Where a goal or a start may be: cells of 1 m, split once and for all into train and test, and draws inside them.
+"""Where a goal or a start may be: cells of 1 m, split once and for all into three sets, and draws inside them.
 
 Whether a cell belongs to the test set is decided by a fixed seed alone, so the sets are the same in every run, on a
-storey of both levels: 20 % of the free cells never hold the centre of a goal in training. Disjoint are the centres, not
-the pads: a pad reaches into the cells around its own, and the nearest training goal may be a step across an edge away.
+storey of both levels: 20 % of the free cells never hold the centre of a goal in training. Of the others, 10 % are for
+validation: by them one of several trained policies is chosen. Disjoint are the centres, not the pads: a pad reaches
+into the cells around its own, and the nearest training goal may be a step across an edge away. A whole quarter of each
+storey as the test set is farther away.
 A place is drawn in a cell of the set and rejected as long as obstacles are in the way; with the sizes of these arenas
 64 draws fail with a chance below 1e-9.
 """
@@ -34,6 +36,7 @@ wp.set_module_options({"enable_backward": False})
 
 SPLIT_SEED = 527  # of the train and test sets; never to be changed
 TEST_FRACTION = 0.2
+VALIDATION_FRACTION = 0.1  # of what is not for tests
 _PAD_REACH = float(np.hypot(2.5, 1.0) / 2)  # [m] 1.35, from the published pad's centre to its corners
 _WALL_MARGIN = _PAD_REACH + 0.15  # [m] from a goal's centre to a wall
 _START_MARGIN = 3.5  # [m] from a goal to the published start
@@ -48,23 +51,29 @@ _BLOCK_RANGE = wp.constant(11.0)  # [m] how far out blocks stand, per axis: cars
 _BLOCK_GAP = wp.constant(6.0)  # [m] between the middles of blocks: a car passes between any two
 
 
-def cells(storey: int, level: int, split: str) -> NDArray[np.float32]:
+def cells(storey: int, level: int, split: str, quarter: int = 0) -> NDArray[np.float32]:
     """The lower corners of the cells of a split, shape (cells, 2), x and z [m].
 
     Args:
         storey: 0 or 1.
         level: 1 or 2: their published starts differ, and level 2 has portals.
-        split: `train` or `test`.
+        split: `train`, `validation` or `test`.
+        quarter: of the storey, which is the test set; 0: cells all over it are.
     """
     x = np.arange(np.ceil(INNER_FACES[0] + _WALL_MARGIN), np.floor(INNER_FACES[1] - _WALL_MARGIN))
     z = np.arange(np.ceil(INNER_FACES[2] + _WALL_MARGIN), np.floor(INNER_FACES[3] - _WALL_MARGIN))
     corners = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-    is_test = np.random.default_rng((SPLIT_SEED, storey)).random(len(corners)) < TEST_FRACTION
+    if quarter:
+        is_test = (corners[:, 0] >= 0.0) + 2 * (corners[:, 1] >= 0.0) == quarter - 1
+    else:
+        is_test = np.random.default_rng((SPLIT_SEED, storey)).random(len(corners)) < TEST_FRACTION
+    is_validation = np.random.default_rng((SPLIT_SEED, storey, 1)).random(len(corners)) < VALIDATION_FRACTION
+    is_validation &= ~is_test
+    is_chosen = {"train": ~is_test & ~is_validation, "validation": is_validation, "test": is_test}[split]
     corners = corners + np.array((STOREY_X[storey], STOREY_Z[storey]))
-    is_free = np.ones(len(corners), dtype=np.bool_)
     for position, margin in _kept_free(level):
-        is_free &= np.hypot(*(corners + 0.5 - np.array(position)).T) > margin + np.sqrt(0.5)
-    return np.asarray(corners[is_free & (is_test == (split == "test"))], dtype=np.float32)
+        is_chosen &= np.hypot(*(corners + 0.5 - np.array(position)).T) > margin + np.sqrt(0.5)
+    return np.asarray(corners[is_chosen], dtype=np.float32)
 
 
 def _kept_free(level: int) -> list[tuple[tuple[float, float], float]]:

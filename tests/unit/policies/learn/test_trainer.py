@@ -4,10 +4,12 @@ import json
 
 import pytest
 import torch
+from pydantic import ValidationError
 
 from policies.learn.checkpoint import checkpoints, load, save
 from policies.learn.config.run import RunConfig
-from policies.learn.export.policy_file import CHECKPOINT, load_policy
+from policies.learn.evaluate import Evaluation
+from policies.learn.export.policy_file import CHECKPOINT, POLICY, load_policy
 from policies.learn.export.policy_path import CheckpointError
 from policies.learn.trainer import Training, train
 
@@ -194,6 +196,15 @@ def test_networks_of_another_run_are_where_a_new_one_starts(tmp_path, kind):
     assert start["steps"] == 0
 
 
+def test_a_policy_saved_before_a_setting_of_networks_was_there_is_where_a_new_run_starts(tmp_path):
+    old = tmp_path / "old.pt"
+    content = load(train(config(tmp_path), StopAfter(1)).policy, POLICY)
+    del content["policy"]["network"]["perceives"]
+    save(old, content, POLICY)
+    start = Training(config(tmp_path, KINDS["ppo"] | {"init_path": str(old)}, run_id="next"), StopAfter()).learner
+    torch.testing.assert_close(start.policy.state_dict(), load_policy(old)[0].state_dict(), rtol=0.0, atol=0.0)
+
+
 def test_networks_that_do_not_fit_are_refused_with_the_first_difference(tmp_path):
     train(config(tmp_path), StopAfter(1))
     with pytest.raises(CheckpointError, match=r"network_settings\.memory"):
@@ -222,3 +233,38 @@ def test_policy_starts_alone_where_the_critic_has_other_signals(tmp_path):
     learner = Training(config(tmp_path, kind, initialize_from="run", run_id="next"), StopAfter()).learner
     there = load_policy(tmp_path / "run" / "B.pt")[0]
     torch.testing.assert_close(learner.policy.state_dict(), there.state_dict(), rtol=0.0, atol=0.0)
+
+
+class Judgements:
+    """Stands for a success target: gives the judgements of a list, one after the other."""
+
+    def __init__(self, *successes):
+        self.left = [Evaluation({"success": count, "timeout": 100 - count}, 0.0, 1.0) for count in successes]
+        self.policies = []
+
+    def judge(self, policy, *_):
+        self.policies.append({name: tensor.clone() for name, tensor in policy.state_dict().items()})
+        return self.left.pop(0)
+
+    def is_reached(self, _judged):
+        return False
+
+
+def test_the_policy_that_was_judged_best_is_what_training_ends_with(tmp_path):
+    best = KINDS["ppo"] | {"success_target": 0.99, "keep_best": True, "summary_freq": 1_000}
+    training = Training(config(tmp_path, best), StopAfter(3))
+    training._target = judgements = Judgements(40, 70, 60)
+    result = training.run()
+    policy, card = load_policy(result.policy)
+    torch.testing.assert_close(dict(policy.state_dict()), judgements.policies[1], rtol=0.0, atol=0.0)
+    assert result.judged.success_rate == card.figures["success_rate"] == 0.7
+    assert card.steps == 2048
+    resumed = Training(config(tmp_path, best, resume=True), StopAfter(1))
+    resumed._target = Judgements(69)
+    again = load_policy(resumed.run().policy)[0]
+    torch.testing.assert_close(again.state_dict(), policy.state_dict(), rtol=0.0, atol=0.0)
+
+
+def test_the_best_policy_is_not_kept_where_none_is_judged(tmp_path):
+    with pytest.raises(ValidationError, match="keep_best: takes a success_target"):
+        config(tmp_path, KINDS["ppo"] | {"keep_best": True})

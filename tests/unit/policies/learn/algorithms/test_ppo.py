@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from policies.learn.algorithms.ppo import Ppo
-from policies.learn.algorithms.schedule import scheduled
+from policies.learn.algorithms.schedule import scheduled, sharpened
 from policies.learn.config.behavior import Behavior, PpoHyperparameters
 from policies.learn.config.network import Memory, NetworkSettings
 from policies.learn.networks.policy import Policy
@@ -174,6 +174,12 @@ def test_rates_fall_to_their_floors():
     assert statistics["Policy/Epsilon"] == pytest.approx(0.1)
     assert scheduled(0.2, 0.1, "linear", 0.5) == pytest.approx(0.15)
     assert scheduled(0.2, 0.1, "constant", 0.5) == 0.2
+
+
+def test_sharpening_is_whole_after_three_quarters_however_it_is_divided():
+    assert sharpened(4.0, 0.0, 0.5) == sharpened(4.0, 0.75, 1.0) == 1.0
+    assert sharpened(4.0, 0.4, 0.9) == pytest.approx(4.0)
+    assert sharpened(4.0, 0.4, 0.6) * sharpened(4.0, 0.6, 0.7) * sharpened(4.0, 0.7, 1.2) == pytest.approx(4.0)
 
 
 def test_a_shared_body_is_trained_once():

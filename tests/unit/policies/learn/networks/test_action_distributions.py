@@ -95,3 +95,15 @@ def test_heads_start_as_ml_agents_does():
     assert built.logits.weight.std().item() == pytest.approx(0.1 / 64.0, rel=0.02)
     assert built.log_sigma.abs().max() == 0.0
     assert built.mean.bias.abs().max() == 0.0
+
+
+def test_sharpened_choices_are_drawn_as_the_most_probable_ones_which_stay():
+    built, observation = heads(), features(200)
+    before = built(observation)
+    built.sharpen(4.0)
+    after = built(observation)
+    assert torch.equal(after.mode().branches, before.mode().branches)
+    assert torch.equal(after.mean, before.mean)
+    expected = (4.0 * before.choice_logs).log_softmax(-1)[..., :2]
+    assert torch.allclose(after.choice_logs[..., :2].log_softmax(-1), expected.log_softmax(-1), atol=1e-4)
+    assert (after.choice_logs.amax(-1) >= before.choice_logs.amax(-1) - 1e-6).all()

@@ -173,15 +173,31 @@ def test_improved_episodes_differ_and_begin_clear_of_everything():
         assert len(np.unique(values)) > 1900
 
 
-def test_goals_of_train_and_test_lie_in_different_cells():
-    def goal_cells(split):
-        task = built(4096, goals="anywhere", split=split, resets="clean")
-        return {tuple(cell) for cell in np.floor(task.world.goal.numpy()[:, :2]).astype(int).tolist()}
+def goal_cells(**settings):
+    task = built(4096, goals="anywhere", resets="clean", **settings)
+    return {tuple(cell) for cell in np.floor(task.world.goal.numpy()[:, :2]).astype(int).tolist()}
 
-    train, test = goal_cells("train"), goal_cells("test")
+
+def test_goals_of_train_validation_and_test_lie_in_different_cells():
+    train, validation, test = (goal_cells(split=split) for split in ("train", "validation", "test"))
+    assert not train & validation
     assert not train & test
-    assert 0.15 < len(test) / (len(train) + len(test)) < 0.25
+    assert not validation & test
+    count = len(train) + len(validation) + len(test)
+    assert 0.15 < len(test) / count < 0.25
+    assert 0.05 < len(validation) / count < 0.11
     assert len(train) > 300
+
+
+@pytest.mark.parametrize(("quarter", "signs"), [(1, (-1, -1)), (2, (1, -1)), (3, (-1, 1)), (4, (1, 1))])
+def test_a_quarter_held_out_holds_the_test_goals_and_no_other(quarter, signs):
+    test = np.array(list(goal_cells(quarter=quarter, split="test"))) + 0.5
+    assert (np.sign(test) == signs).all()
+    assert len(test) > 100
+    for split in ("train", "validation"):
+        others = np.array(list(goal_cells(quarter=quarter, split=split))) + 0.5
+        assert not (np.sign(others) == signs).all(axis=1).any()
+        assert len({tuple(sign) for sign in np.sign(others).tolist()}) == 3
 
 
 @pytest.mark.parametrize("preset", ["as-documented", "as-coded"])
@@ -190,9 +206,12 @@ def test_published_spots_are_for_training_and_lie_in_training_cells(preset):
         return built(512, preset=preset, **settings).world.goal.numpy()[:, :2]
 
     assert len(np.unique(positions(), axis=0)) <= 3
+    assert len(np.unique(positions(goals="one", resets="clean"), axis=0)) == 1
     test_cells = {tuple(cell) for cell in cells(0, 1, "test").tolist()}
+    validation_cells = {tuple(cell) for cell in cells(0, 1, "validation").tolist()}
     assert {tuple(np.floor(position)) for position in positions(split="test").tolist()} <= test_cells
-    assert not {tuple(np.floor(spot)) for spot in (*LEVEL1_SPOTS, LEVEL1_MARKER)} & test_cells
+    assert {tuple(np.floor(position)) for position in positions(split="validation").tolist()} <= validation_cells
+    assert not {tuple(np.floor(spot)) for spot in (*LEVEL1_SPOTS, LEVEL1_MARKER)} & (test_cells | validation_cells)
     assert len(np.unique(positions(split="test", goals="published"), axis=0)) <= 3
 
 
@@ -250,7 +269,7 @@ def test_numbers_may_be_randomised():
     ("settings", "message"),
     [
         ({"preset": "hard"}, "Parking1: preset: must be as-documented, as-coded or improved, not hard"),
-        ({"split": "all"}, "Parking1: split: must be train or test, not all"),
+        ({"split": "all"}, "Parking1: split: must be train, validation or test, not all"),
         ({"ray_tags": "wall+tree"}, "Parking1: ray_tags: .*at most once"),
         ({"observation": "pixels"}, "Parking1: observation"),
     ],

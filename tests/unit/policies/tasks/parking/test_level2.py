@@ -168,10 +168,12 @@ def cells_of(positions):
 def test_goals_anywhere_lie_clear_of_portals_and_of_the_start_in_disjoint_cells():
     goals = {
         split: built(4096, goals="anywhere", split=split, storey="both").world.goal.numpy()[:, :2]
-        for split in ("train", "test")
+        for split in ("train", "validation", "test")
     }
-    train, test = (cells_of(positions) for positions in goals.values())
+    train, validation, test = (cells_of(positions) for positions in goals.values())
     assert not train & test
+    assert not train & validation
+    assert not validation & test
     for positions in goals.values():
         for x, z, _ in (*PORTAL_POSITIONS, *PORTAL_EXITS):
             assert np.linalg.norm(positions - (x, z), axis=1).min() > 3.4
