@@ -1,8 +1,8 @@
 """Whether the phone is with whom is taken for the owner: its reports against sights.
 
 In: each report, where the owner is seen, where others are. Out: who else it would rather be, or that it is none of
-those who are seen. The phone's slow error is learned from the sights; only others who are there make it doubt, for a
-phone alone may be wrong by many metres.
+those who are seen. The phone's slow error is learned from the sights, and how far it goes astray from that; only others
+who are there make it doubt, for a phone alone may be wrong by many metres.
 """
 
 from enum import Enum
@@ -16,6 +16,9 @@ _BETTER_M = 1.0  # by so much somebody else must fit better
 _OFF_M = 1.2  # nearer than this to the phone nobody is doubted
 _FAR_M = 3.5  # farther off it is not the owner, if others have been there
 _REPORTS = 3  # in a row
+_STEADY = 0.1  # of each report: by what it goes astray is learned sooner than where to
+_STRAY_M = 0.5  # a phone is taken to go astray by so much at least,
+_STRAYS = 3.0  # and what is within so many times of it is no reason to doubt
 
 
 class Word(Enum):
@@ -31,6 +34,7 @@ class PhoneCheck:
 
     def __init__(self) -> None:
         self._off: Floats | None = None  # [m] the phone's slow error, level
+        self._stray2 = _STRAY_M**2  # [m²] mean square of what it goes astray from that
         self._doubts = 0
 
     def owner(self, phone: Floats) -> Floats | None:
@@ -53,9 +57,11 @@ class PhoneCheck:
         off_m = float(np.hypot(*(seen[:2] - expected)))
         others_m = [float(np.hypot(*(other[:2] - expected))) for other in others]
         best = int(np.argmin(others_m)) if others_m else -1
-        is_another = best >= 0 and off_m > _OFF_M and others_m[best] < off_m - _BETTER_M
-        if not is_another and not (off_m > _FAR_M and has_met_others):
+        astray_m = _STRAYS * max(self._stray2**0.5, _STRAY_M)
+        is_another = best >= 0 and off_m > max(_OFF_M, 0.5 * astray_m) and others_m[best] < off_m - _BETTER_M
+        if not is_another and not (off_m > max(_FAR_M, astray_m) and has_met_others):
             self._doubts = 0
+            self._stray2 += _STEADY * (off_m * off_m - self._stray2)
             self._off = (1.0 - _LEARNS) * (phone[:2] - expected) + _LEARNS * (phone[:2] - seen[:2])
             return Word.AGREES, -1
         self._doubts += 1
