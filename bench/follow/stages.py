@@ -90,7 +90,6 @@ STAGES: dict[str, Stage] = {
             "follow-me-tracked",
             start="tracked-student",
             flies=True,
-            ships=False,
             limit_s=3600.0,
             targets=(0.98, 0.95),
         ),

@@ -7,6 +7,7 @@ Nothing of the truth goes back to who flies.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import radians, tan
 
 import numpy as np
@@ -49,6 +50,16 @@ def taken_over(flight: FlightBase, phase: Phase, *, has_begun: bool, is_put_back
     return f"mode {state.mode.name.replace('_', ' ').title()} was chosen"
 
 
+@dataclass(frozen=True, slots=True)
+class Smoothness:
+    """How calmly a vehicle moved."""
+
+    accel_rms: float
+    """[m/s²] level, of velocities a tenth of a second apart."""
+    yaw_rate_rms: float
+    """[deg/s]"""
+
+
 class FollowWatch:
     """Watches vehicle 0 of a flight: call `frame` after each of the flight's.
 
@@ -81,6 +92,7 @@ class FollowWatch:
         who = [cast.params, cast.people, cast.bystanders, cast.drawn]
         self._inputs = [rig.worlds, rig.i_world, rig.truth, *who, int(flight.drives), touch_m, self._out]
         self._rows: list[NDArray[np.float32]] = []
+        self._motion: list[tuple[float, float, float]] = []  # north, east [m/s], yaw rate [rad/s], of each row
         self._start_us = -1  # of the flight, when it began to follow; -1: not yet
         self._frame_us = 0  # when the last frame was
         self._judged_us = 0  # for so long it has followed
@@ -143,6 +155,17 @@ class FollowWatch:
         is_due = self._judged_us >= (len(self._rows) + 1) * _SAMPLE_US
         if is_due or has_collided or (is_left and not self._rows):
             self._rows.append(self._row.copy())
+            truth = self._flight.rig.rows["truth"][0]
+            north, east, _ = truth["vel_ned"].tolist()
+            self._motion.append((north, east, float(truth["omega_frd"][2])))
+
+    def smoothness(self) -> Smoothness:
+        """Of what was flown so far; zeros before the second sample."""
+        if len(self._motion) < 2:
+            return Smoothness(0.0, 0.0)
+        north, east, yaw_rate = np.array(self._motion).T
+        accel = np.hypot(np.diff(north), np.diff(east)) / DECISION_S
+        return Smoothness(float(np.sqrt(np.mean(accel**2))), float(np.degrees(np.sqrt(np.mean(yaw_rate**2)))))
 
     def track(self) -> Track | None:
         """What was followed of the planned time; none before the first sample."""

@@ -8,6 +8,7 @@ each time.
 import json
 from collections.abc import Callable
 from contextlib import ExitStack, closing
+from dataclasses import asdict
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -33,7 +34,7 @@ from mission.flight_session import FlightSession
 from mission.flight_settings import OURS, FollowOptions
 from mission.follow.companion_process import latency_text
 from mission.follow.follow_options import follow_config
-from mission.follow.follow_scoring import FollowWatch, taken_over
+from mission.follow.follow_scoring import FollowWatch, Smoothness, taken_over
 from mission.follow.lockstep import flight_with_companion
 from mission.kernel_loading import load_kernels
 from mission.run_folder import OwnFiles, run_folder
@@ -123,6 +124,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     exit_code = finish(watch, session.files, console, is_down=is_down, is_stopped=is_stopped)
     if flight.is_crashed:
         print_line(console, "the vehicle crashed" + (f" ({', '.join(watch.takeovers)})" if watch.takeovers else ""))
+    print_line(console, guard_text(companion))
     print_line(console, latency_text(companion))
     has_film = options.has_film and filmed(flight, folder, console)
     print_line(console, f"{'logs, scorecard and film' if has_film else 'logs and scorecard'}: {folder}")
@@ -238,10 +240,11 @@ def finish(watch: FollowWatch, files: OwnFiles, console: Console, *, is_down: bo
     if track is None:
         print_line(console, "the owner was not followed: there is no scorecard")
         return 0 if is_excused and not files.missing else 1
-    card = scorecard([track])
+    card, smoothness = scorecard([track]), watch.smoothness()
     with files.writing("summary.json") as path:
-        write_whole(path, (json.dumps(summary_of(card), indent=2) + "\n").encode())
-    console.print(_table(card))
+        summary = summary_of(card) | asdict(smoothness)
+        write_whole(path, (json.dumps(summary, indent=2) + "\n").encode())
+    console.print(_table(card, smoothness))
     is_good = track.is_whole and card.collision.value == 0.0 and (is_down or is_excused)
     return 0 if is_good and not files.missing else 1
 
@@ -253,8 +256,19 @@ def summary_of(card: Scorecard) -> dict[str, float | None]:
     return {name: value if isfinite(value) else None for name, value in figures.items()} | {"minutes": card.minutes}
 
 
-def _table(card: Scorecard) -> Table:
+def guard_text(companion: Companion) -> str:
+    """What a guard has changed of the decisions, most frequent first."""
+    guard = getattr(companion.skill, "guard", None)
+    if guard is None:
+        return "no guard"
+    reasons = ", ".join(f"{count} {reason}" for reason, count in guard.interventions.most_common())
+    return f"decisions that the guard changed: {reasons or 'none'}; of {companion.decision_count}"
+
+
+def _table(card: Scorecard, smoothness: Smoothness) -> Table:
     table = Table("figure", "value", title="scorecard", title_justify="left")
     for row in lines(card):
         table.add_row(*row)
+    table.add_row("own level acceleration, RMS", f"{smoothness.accel_rms:.2f} m/s²")
+    table.add_row("own yaw rate, RMS", f"{smoothness.yaw_rate_rms:.1f} deg/s")
     return table

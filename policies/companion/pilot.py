@@ -105,22 +105,29 @@ class TrackedPilot:
 
     def __init__(self, policy: Policy, source: str) -> None:
         try:
-            Layout(TASK, LAYOUT_VERSION, TRACKED_ELEMENTS, ACTIONS).require(policy.layout, source)
+            Layout(TASK, LAYOUT_VERSION, TRACKED_ELEMENTS, ACTIONS, stack=policy.layout.stack).require(
+                policy.layout, source
+            )
         except LayoutError as error:
             raise PilotError(str(error)) from error
         self._policy = policy
-        self._memory = policy.start_memory(1)
+        self._frames: Floats = np.zeros((policy.layout.stack, len(TRACKED_ELEMENTS)), np.float32)  # oldest first
         self.owner_hfrd: Vector | None = None
         torch.set_num_threads(1)
-        self.act(np.zeros(policy.layout.observation_size, np.float32), np.zeros(self.image_shape, np.uint8))
+        self.reset()
+        self.act(self._frames[-1], np.zeros(self.image_shape, np.uint8))
         self.reset()
 
     def reset(self) -> None:
+        """As at an episode's start."""
         self._memory = self._policy.start_memory(1)
+        self._frames[:] = 0.0
 
     def act(self, vector: Floats, image: NDArray[np.uint8]) -> Floats:  # noqa: ARG002  (others look at it)
+        self._frames[:-1] = self._frames[1:]
+        self._frames[-1] = vector
         with torch.inference_mode():
-            observation = Observation(torch.from_numpy(vector)[None], None)
+            observation = Observation(torch.from_numpy(self._frames.ravel())[None], None)
             actions, self._memory = self._policy.act(observation, self._memory)
             bounded: Floats = self._policy.bounded(actions)[0].numpy()
         return bounded

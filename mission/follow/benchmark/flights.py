@@ -37,6 +37,7 @@ class Outcome:
     seed: int
     in_band: float  # of the planned time
     is_collided: bool
+    is_somebody_hit: bool  # and it was a person, not something solid
     nearest_m: float  # to the owner's chest
     nearest_hidden_m: float  # while they were hidden; NaN: they never were
     has_stood: bool | None  # five seconds after the last sight; None: never out of sight for so long
@@ -57,37 +58,42 @@ def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, sec
     config = FlightConfig(owner=owner, world=world, seed=seed, wind_m_s=WINDS_M_S[k % 5])
     flight, companion = flight_with_companion(config, pilot, guard=guard)
     rows: list[tuple[float, ...]] = []
+    has_touched = False
 
     def look(watch: FollowWatch) -> None:
+        nonlocal has_touched
         if watch.sample_count > len(rows):
             truth = flight.rig.rows["truth"][0]
+            has_touched = bool(truth["impact_speed"] > 0.0 or truth["is_on_ground"] or truth["is_crashed"])
             is_hidden = float(flight.owner.cast.rows.drawn.numpy()[0, 0]["stature_m"] <= 0.0)
-            rows.append((is_hidden, *truth["vel_ned"][:2].tolist(), float(truth["omega_frd"][2])))
+            rows.append((is_hidden, *truth["vel_ned"][:2].tolist()))
 
     watch = follow_for(flight, companion, seconds, look)
     track = watch.track()
     if track is None:
         raise ValueError("a flight of no time has no outcome")
-    is_hidden, north, east, yaw_rate = np.array(rows).T
+    is_hidden, north, east = np.array(rows).T
+    is_collided = bool(track.is_collided.any())
     distance, speed = track.distance_m[: len(rows)], np.hypot(north, east)
     bounds = Ranges()
     is_in_band = (distance >= bounds.near_m) & (distance <= bounds.far_m)
     skill = companion.skill
     held = skill.guard if isinstance(skill, Following) else None
     changes = sum(held.interventions.values()) if held is not None else 0
-    accel = np.hypot(np.diff(north), np.diff(east)) / track.interval_s
+    smoothness = watch.smoothness()
     hidden = is_hidden > 0.0
     return Outcome(
         seed=seed,
         in_band=float(is_in_band.sum() / track.planned_count),
-        is_collided=bool(track.is_collided.any()),
+        is_collided=is_collided,
+        is_somebody_hit=is_collided and not has_touched,
         nearest_m=float(track.distance_m.min()),
         nearest_hidden_m=float(distance[hidden].min()) if hidden.any() else nan,
         has_stood=_has_stood(hidden, speed, track.interval_s),
         has_resumed=_has_resumed(hidden, is_in_band, track.interval_s),
         interventions_per_min=60.0 * changes / max(len(rows) * track.interval_s, 1.0),
-        accel_rms=float(np.sqrt(np.mean(accel**2))) if len(accel) else 0.0,
-        yaw_rate_rms=float(np.degrees(np.sqrt(np.mean(yaw_rate**2)))),
+        accel_rms=smoothness.accel_rms,
+        yaw_rate_rms=smoothness.yaw_rate_rms,
         ended_s=float(track.time_s[-1]),
         trouble=companion.trouble,
     )

@@ -14,6 +14,8 @@ START_SPEED_STD = wp.constant(1.5)  # [m/s] of somebody new
 FORGOTTEN_S = wp.constant(3.0)  # after so long without a sight they are somebody new
 SLOWS_S = wp.constant(1.5)  # unseen, their velocity is believed less, with this time
 DOWN_GAIN = wp.constant(0.3)  # of each sight's height
+CALM_S = wp.constant(0.7)  # with this time a calm velocity follows
+ODD_STDS = wp.constant(3.0)  # an innovation of more counts as so much: it may be no sight of the owner
 ALONG_STD_M = wp.constant(0.03)  # of a sight with depth, and more with each metre; measured
 ALONG_STD_FRACTION = wp.constant(0.015)
 COLOUR_STD_FRACTION = wp.constant(0.15)  # of a range by colours alone; measured
@@ -27,6 +29,7 @@ class OwnerFilter:
 
     pos_ned: wp.vec3  # [m] of the chest, at the newest sight
     vel_ned: wp.vec2  # [m/s] level
+    calm_vel_ned: wp.vec2  # [m/s] the same, smooth and late
     pos_var: wp.mat22  # [m²]
     cross_var: wp.mat22  # [m²/s] of place and velocity
     vel_var: wp.mat22  # [m²/s²]
@@ -96,12 +99,15 @@ def seen(f: OwnerFilter, pos_ned: wp.vec3, eye_ned: wp.vec3, has_depth: int, age
     f = predicted(f, wp.max(dt_s, 0.0))
     innov = wp.vec2(pos_ned[0] - f.pos_ned[0], pos_ned[1] - f.pos_ned[1])
     innov_inv = wp.inverse(f.pos_var + obs_var)
+    stds = wp.sqrt(wp.max(wp.dot(innov, innov_inv * innov), 0.0))
+    innov = innov * wp.min(1.0, ODD_STDS / wp.max(stds, 1.0e-6))
     pos_gain = f.pos_var * innov_inv
     vel_gain = wp.transpose(f.cross_var) * innov_inv
     pos_step = pos_gain * innov
     down = DOWN_GAIN * (pos_ned[2] - f.pos_ned[2])
     f.pos_ned = f.pos_ned + wp.vec3(pos_step[0], pos_step[1], down)
     f.vel_ned = f.vel_ned + vel_gain * innov
+    f.calm_vel_ned = f.calm_vel_ned + wp.min(dt_s / CALM_S, 1.0) * (f.vel_ned - f.calm_vel_ned)
     f.vel_var = even(f.vel_var - vel_gain * f.cross_var)
     f.cross_var = f.cross_var - pos_gain * f.cross_var
     f.pos_var = even(f.pos_var - pos_gain * f.pos_var)

@@ -22,7 +22,7 @@ from policies.tasks.flight.own_state import (
     write_own,
 )
 from policies.tasks.follow_me.observe import DECISION_S, IMAGE_SHOWN_OLD_S
-from policies.tasks.follow_me.owner_filter import OwnerFilter, place_now, velocity_now
+from policies.tasks.follow_me.owner_filter import OwnerFilter, place_now, slowing, velocity_now
 from policies.tasks.layout import Element
 
 wp.set_module_options({"enable_backward": False})
@@ -38,13 +38,14 @@ _POSITION_MAX = wp.constant(5.0)  # in scales
 _INNOV_SCALE = wp.constant(0.2)  # [m]
 _AGE_SCALE = wp.constant(1.0)  # [s]
 _AGE_MAX = wp.constant(3.0)
-_OWNER_SIZE = wp.constant(16)
+_OWNER_SIZE = wp.constant(18)
 
 TRACKED_ELEMENTS = (
     *OWN_ELEMENTS,
     Element("image_age", "s", float(IMAGE_SHOWN_OLD_S)),
     *(Element(f"seen_owner_pos_hfrd_{axis}", "m", float(_POSITION_SCALE)) for axis in "xyz"),
     *(Element(f"seen_owner_vel_hfrd_{axis}", "m/s", float(SPEED_SCALE)) for axis in "xy"),
+    *(Element(f"seen_owner_calm_vel_hfrd_{axis}", "m/s", float(SPEED_SCALE)) for axis in "xy"),
     *(Element(f"seen_owner_innov_hfrd_{axis}", "m", float(_INNOV_SCALE)) for axis in "xy"),
     Element("seen_distance", "m", float(_POSITION_SCALE)),
     Element("seen_bearing_sin", "1"),
@@ -94,6 +95,8 @@ def _write_owner(own: OwnState, f: OwnerFilter, out: wp.array2d(dtype=float), i:
     way = level_from_ned(place_now(f) - own.pos_ned, yaw)
     velocity = velocity_now(f)
     vel = level_from_ned(wp.vec3(velocity[0], velocity[1], 0.0), yaw)
+    left = slowing(f.age_s)
+    calm = level_from_ned(wp.vec3(left * f.calm_vel_ned[0], left * f.calm_vel_ned[1], 0.0), yaw)
     innov = level_from_ned(wp.vec3(f.innov_ned[0], f.innov_ned[1], 0.0), yaw)
     far_m = wp.max(wp.length(way), 1.0e-3)
     level_m = wp.max(wp.sqrt(way[0] * way[0] + way[1] * way[1]), 1.0e-3)
@@ -102,17 +105,18 @@ def _write_owner(own: OwnState, f: OwnerFilter, out: wp.array2d(dtype=float), i:
         out[i, at + k] = shown[k]
     for k in range(2):
         out[i, at + 3 + k] = vel[k] / SPEED_SCALE
-        out[i, at + 5 + k] = wp.clamp(innov[k] / _INNOV_SCALE, -3.0, 3.0)
-    out[i, at + 7] = wp.min(far_m / _POSITION_SCALE, _POSITION_MAX)
-    out[i, at + 8] = way[1] / level_m
-    out[i, at + 9] = way[0] / level_m
-    out[i, at + 10] = wp.min(wp.sqrt(wp.max(wp.trace(f.pos_var), 0.0)), 3.0)
-    out[i, at + 11] = wp.min(wp.sqrt(wp.max(wp.trace(f.vel_var), 0.0)), 3.0)
-    out[i, at + 12] = wp.min(f.age_s / _AGE_SCALE, _AGE_MAX)
-    out[i, at + 13] = 1.0
+        out[i, at + 5 + k] = calm[k] / SPEED_SCALE
+        out[i, at + 7 + k] = wp.clamp(innov[k] / _INNOV_SCALE, -3.0, 3.0)
+    out[i, at + 9] = wp.min(far_m / _POSITION_SCALE, _POSITION_MAX)
+    out[i, at + 10] = way[1] / level_m
+    out[i, at + 11] = way[0] / level_m
+    out[i, at + 12] = wp.min(wp.sqrt(wp.max(wp.trace(f.pos_var), 0.0)), 3.0)
+    out[i, at + 13] = wp.min(wp.sqrt(wp.max(wp.trace(f.vel_var), 0.0)), 3.0)
+    out[i, at + 14] = wp.min(f.age_s / _AGE_SCALE, _AGE_MAX)
+    out[i, at + 15] = 1.0
     own_vel = level_from_ned(own.vel_ned, yaw)
     coming = (own_vel[0] - vel[0]) * way[0] + (own_vel[1] - vel[1]) * way[1]
-    out[i, at + 15] = coming / level_m / SPEED_SCALE
+    out[i, at + 17] = coming / level_m / SPEED_SCALE
 
 
 @wp.func
@@ -132,7 +136,7 @@ def write_tracked(
     out[i, at + OWN_SIZE] = wp.min(image_age_s, IMAGE_SHOWN_OLD_S) / IMAGE_SHOWN_OLD_S
     first = at + OWN_SIZE + 1
     _write_owner(own, f, out, i, first)
-    out[i, first + 14] = float(has_depth)
+    out[i, first + 16] = float(has_depth)
     for k in range(_SECTORS):
         out[i, first + _OWNER_SIZE + k] = nearness[i, k]
 

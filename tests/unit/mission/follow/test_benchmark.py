@@ -94,8 +94,8 @@ def test_standing_and_following_again_are_counted_from_what_was_seen():
 
 
 def test_what_fell_short_is_named():
-    good = Outcome(1, 0.99, False, 1.5, float("nan"), None, None, 0.0, 1.0, 10.0, 60.0, "")
-    bad = Outcome(3, 0.5, True, 0.4, float("nan"), None, None, 0.0, 1.0, 10.0, 20.0, "")
+    good = Outcome(1, 0.99, False, False, 1.5, float("nan"), None, None, 0.0, 1.0, 10.0, 60.0, "")
+    bad = Outcome(3, 0.5, True, True, 0.4, float("nan"), None, None, 0.0, 1.0, 10.0, 20.0, "")
     assert misses("follow", {"walk": [good]}) == []
     assert len(misses("follow", {"walk": [good, bad]})) == 2
 

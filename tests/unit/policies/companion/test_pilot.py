@@ -136,3 +136,21 @@ def test_a_file_that_is_no_policy_is_refused(tmp_path):
     path.write_bytes(b"nothing of the kind")
     with pytest.raises(PilotError, match="damaged"):
         load_pilot(str(path))
+
+
+def test_a_policy_without_images_is_told_its_last_frames_and_none_after_a_reset(tmp_path):
+    layout = _layout(FollowSettings(observation="tracked", stack=3))
+    pilot = load_pilot(str(saved(tmp_path, policy(layout))))
+    size = layout.observation_size // 3
+    image, told = np.zeros(pilot.image_shape, np.uint8), []
+
+    def listening(observation, memory):
+        told.append(observation.vector[0].numpy()[::size].tolist())
+        return act(observation, memory)
+
+    act, pilot._policy.act = pilot._policy.act, listening
+    for k in (1.0, 2.0, 3.0, 4.0):
+        pilot.act(np.full(size, k, np.float32), image)
+    pilot.reset()
+    pilot.act(np.full(size, 5.0, np.float32), image)
+    assert told == [[0.0, 0.0, 1.0], [0.0, 1.0, 2.0], [1.0, 2.0, 3.0], [2.0, 3.0, 4.0], [0.0, 0.0, 5.0]]

@@ -93,3 +93,21 @@ def test_an_owner_who_runs_is_no_obstacle_in_late_images(scene: tuple[Guard, Own
         guard.senses.sense(own, Owner(), ImageFrame(taken_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M)))
     known_m = guard.senses.map.clear_m(own.pos_ned, own.boot_us)[1]
     assert known_m[0] > 9.0  # to the north, where they run
+
+
+@pytest.mark.parametrize("wanted_down", [-2.0, 2.0])
+def test_a_policy_that_wants_up_or_down_stays_between_the_heights(
+    scene: tuple[Guard, Own, Sees], wanted_down: float
+) -> None:
+    guard, own, _ = scene
+    flown(guard, own, 1.0)
+    height_m, climb, heights_m = 2.0, 0.0, []
+    for _ in range(150):
+        (_, _, down), _ = guard.filtered(((0.0, 0.0, wanted_down), 0.0), own)
+        climb += (-down - climb) * 0.1 / 0.35  # as slow as the vehicle answers
+        height_m += 0.1 * climb
+        own.range_m = height_m
+        heights_m.append(height_m)
+    s = guard.settings
+    assert s.height_min_m - 0.15 < min(heights_m)
+    assert max(heights_m) < s.height_max_m + 0.15
