@@ -9,6 +9,7 @@ from policies.companion.guard.settings import GuardSettings
 
 Floats = NDArray[np.float64]
 CLIMB_M_S = 1.0
+SINK_M_S = 0.3  # from above what it may be
 _WAY_M, _STEP_M = 4.0, 0.02  # farther along an arc nothing is asked for
 
 
@@ -124,7 +125,7 @@ def within_heights(down: float, height_m: float, s: GuardSettings) -> float:
     if height_m < s.height_min_m:
         return min(down, -0.5 * CLIMB_M_S)
     if height_m > s.height_max_m:
-        return max(down, _SINK_M_S)
+        return max(down, SINK_M_S)
     down = max(down, -stopping_speed(s.height_max_m - height_m, s.reaction_s, CLIMB_M_S))
     return min(down, stopping_speed(height_m - s.height_min_m, s.reaction_s, CLIMB_M_S))
 
@@ -134,7 +135,6 @@ def faded(age_s: float, from_s: float, to_s: float) -> float:
     return float(np.clip((to_s - age_s) / (to_s - from_s), 0.0, 1.0))
 
 
-_SINK_M_S = 0.3  # from above what it may be
 _STOPS_M_S2 = 4.0  # how fast a person stops; guess
 _DOUBT_M_S = 0.4  # of the speed that the tracker says; guess
 _BACK_GAIN = 3.0  # [1/s]
