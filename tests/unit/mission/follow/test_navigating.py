@@ -189,7 +189,9 @@ def test_full_speed_into_the_trees_is_stopped_before_them_by_the_guard(monkeypat
     monkeypatch.setattr(companion.skill._pilot, "act", lambda _: np.array([1.0, 0.0, 0.0, 0.0], np.float32))
     flight.rig.forget_impacts()
     send_goto(flight, place(flight, 80.0, 0.0), COMPANION)
-    advance(flight, 20.0)
-    assert companion.phase is Phase.FLYING
+    advance(flight, 1.0)
+    advance(flight, 20.0, lambda: companion.phase is not Phase.FLYING)
+    advance(flight, 0.5)
+    assert "Companion: hold: goto reached" in flight.drone.texts  # led round all of them
     assert companion.skill.guard.interventions["near something"] > 50
     assert float(flight.rig.rows["truth"][0]["impact_speed"]) == 0.0

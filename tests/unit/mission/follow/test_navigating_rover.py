@@ -51,7 +51,7 @@ def test_a_goto_is_driven_to_between_trees_and_walls_and_handed_back(component, 
     assert companion.phase is Phase.FLYING
     assert isnan(companion.skill.setpoint(companion.action, companion.vehicle.own)[1])  # its heading is its course
     advance(flight, 60.0, lambda: companion.phase is not Phase.FLYING)
-    assert np.linalg.norm(flight.rig.rows["truth"][0]["vel_ned"]) < 3.0  # slowed down
+    assert np.linalg.norm(flight.rig.rows["truth"][0]["vel_ned"]) < 3.5  # slowed down, from 5 m/s
     advance(flight, 10.0, lambda: companion.phase is Phase.WAITING)
     advance(flight, 3.0)
     assert flight.controller.state.mode is Mode.HOLD
