@@ -28,7 +28,7 @@ from policies.tasks.follow_me.observe import (
     LAYOUT_VERSION,
     vector_elements,
 )
-from policies.tasks.follow_me.tracked import TRACKED_ELEMENTS
+from policies.tasks.follow_me.tracked.vector import TRACKED_ELEMENTS
 from policies.tasks.layout import ImageElement, Layout, LayoutError
 
 Floats = NDArray[np.float32]

@@ -16,7 +16,7 @@ from policies.companion.observation import write_own_row
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import Own
 from policies.tasks.flight.own_state import Command, OwnState
-from policies.tasks.follow_me.tracked import (
+from policies.tasks.follow_me.tracked.vector import (
     REACH_M,
     SECTORS,
     TRACKED_ELEMENTS,

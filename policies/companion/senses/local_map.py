@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from common.attitude import Vector, rotated, yaw_of
 from policies.companion.senses.poses import Pose
 from policies.tasks.follow_me.observe import HFOV_DEG, IMAGE_SIZE, camera_mount, depth_of
-from policies.tasks.follow_me.tracked import SECTORS
+from policies.tasks.follow_me.tracked.vector import SECTORS
 
 CELL_M = 0.25
 CELLS = 96  # of a side: 12 m to each

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from common.warp_start import start_warp
 from policies.companion.senses.poses import Pose
-from policies.tasks.follow_me.owner_filter import OwnerFilter, now_rows, see_rows
+from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, now_rows, see_rows
 
 Floats = NDArray[np.float64]
 

@@ -32,7 +32,7 @@ OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not se
 NO_IMAGES = "no new pictures"
 LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the images that policies are trained on
 STANDING = (Stance.STOP, Stance.SEARCH, Stance.BLIND)
-TRACKED = 3  # the vector of policies.tasks.follow_me.tracked
+TRACKED = 3  # the vector of policies.tasks.follow_me.tracked.vector
 LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view
 
 

@@ -234,7 +234,7 @@ class Behavior(Block):
         return kind.model_validate(raw)
 
     @model_validator(mode="after")
-    def _best_is_told(self) -> Self:
+    def _best_is_reported(self) -> Self:
         if self.keep_best and self.success_target is None:
             raise ValueError("keep_best: takes a success_target, against which policies are held")
         return self

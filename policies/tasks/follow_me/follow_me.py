@@ -54,9 +54,9 @@ from policies.tasks.follow_me.observe import (
 from policies.tasks.follow_me.owner_visibility import Sight
 from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS
 from policies.tasks.follow_me.settings import FollowSettings
-from policies.tasks.follow_me.sight_model import make_tracked, sense
 from policies.tasks.follow_me.task_cameras import Eyes
-from policies.tasks.follow_me.tracked import TRACKED_ELEMENTS
+from policies.tasks.follow_me.tracked.sight_model import make_tracked, sense
+from policies.tasks.follow_me.tracked.vector import TRACKED_ELEMENTS
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 from policies.tasks.layout import ImageElement, Layout
 from policies.tasks.task_params import Sampler, typed_rows

@@ -39,8 +39,8 @@ from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, document
 from policies.tasks.follow_me.owner_visibility import Sight, lens_in, reach_from, see
 from policies.tasks.follow_me.privileged import write_privileged
 from policies.tasks.follow_me.reward import document_reward, follow_outcome, follow_reward, is_in_band
-from policies.tasks.follow_me.sight_model import Tracked
-from policies.tasks.follow_me.tracked import command_fractions, next_command, write_tracked
+from policies.tasks.follow_me.tracked.sight_model import Tracked
+from policies.tasks.follow_me.tracked.vector import command_fractions, next_command, write_tracked
 from sim.advance import RigArrays
 from sim.sensors.camera import Lens
 from sim.sensors.phone import PhoneModel, PhoneState, phone_start, phone_step

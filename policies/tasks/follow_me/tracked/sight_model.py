@@ -16,9 +16,9 @@ from policies.tasks.flight.flown_vehicle import own_state
 from policies.tasks.flight.own_state import Command, ned_from_level
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.image_way import Way
-from policies.tasks.follow_me.owner_filter import OwnerFilter, seen, waited
 from policies.tasks.follow_me.owner_visibility import Sight
-from policies.tasks.follow_me.tracked import REACH_M, SECTORS
+from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, seen, waited
+from policies.tasks.follow_me.tracked.vector import REACH_M, SECTORS
 from sim.advance import RigArrays
 from sim.world.people import Person
 

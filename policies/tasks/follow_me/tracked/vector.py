@@ -22,7 +22,7 @@ from policies.tasks.flight.own_state import (
     write_own,
 )
 from policies.tasks.follow_me.observe import DECISION_S, IMAGE_SHOWN_OLD_S
-from policies.tasks.follow_me.owner_filter import OwnerFilter, place_now, slowing, velocity_now
+from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, place_now, slowing, velocity_now
 from policies.tasks.layout import Element
 
 wp.set_module_options({"enable_backward": False})

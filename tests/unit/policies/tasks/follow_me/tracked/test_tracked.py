@@ -9,7 +9,7 @@ from policies.tasks.flight.own_state import ACTIONS, SPEED_MAX_M_S, YAW_RATE_MAX
 from policies.tasks.flight.ranges import SECTORS as TRUE_SECTORS
 from policies.tasks.follow_me.follow_me import FollowMe
 from policies.tasks.follow_me.settings import FollowSettings
-from policies.tasks.follow_me.tracked import (
+from policies.tasks.follow_me.tracked.vector import (
     ACCEL_MAX_M_S2,
     SECTORS,
     TRACKED_ELEMENTS,
