@@ -157,7 +157,7 @@ def test_actions_outside_their_space_are_refused(name, action):
 
 @pytest.mark.parametrize("name", ["RollerBall", "ReachTarget", "Parking1", "Parking2"])
 def test_presets_and_splits_that_do_not_exist_are_refused(name):
-    with pytest.raises(UnknownTask, match="split: must be train(, validation)? or test"):
+    with pytest.raises(UnknownTask, match=r"split: must be train(, validation)? or test"):
         task_settings(name, {"split": "all"})
     with pytest.raises(UnknownTask, match="preset: must be as-documented, as-coded or improved"):
         task_settings(name, {"preset": "as-dreamt"})
