@@ -51,7 +51,7 @@ def draw(
             grid, np.mean([np.interp(grid, x, y) for x, y in sampled], axis=0), color=colour, linewidth=2.0, label=label
         )
     axes.set_title(title, fontsize=11, loc="left")
-    axes.set_xlabel({"steps": "decisions of all environments", "wall_s": "wall clock [s]"}[over])
+    axes.set_xlabel({"steps": "decisions of all environments", "wall_s": "time of training [s]"}[over])
     axes.set_ylabel({"success": "successful episodes while training", "reward": "mean episode reward"}[value])
     if value == "success":
         axes.set_ylim(-0.02, 1.02)

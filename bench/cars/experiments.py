@@ -108,6 +108,7 @@ PARKING2_IMPROVED = Experiment(
 
 # The document's own goals, start and blocks, on which every row of these is judged.
 _AS_PUBLISHED = {"starts": "published", "obstacles": "published"}
+_ANYWHERE = {"starts": "anywhere", "obstacles": "anywhere"}
 _TWO_MILLION: dict[str, Any] = {"behavior.max_steps": 2_000_000, "behavior.success_target": None}
 _FEW_GOALS = (
     Judged("the goals of training", _AS_PUBLISHED),
@@ -115,22 +116,24 @@ _FEW_GOALS = (
 )
 
 
-def _few_goals(name: str, title: str, document: str, settings: dict[str, Any]) -> Experiment:
+def _few_goals(
+    name: str, title: str, document: str, settings: dict[str, Any], changes: dict[str, Any] | None = None
+) -> Experiment:
     """Parking 1 trained on the document's goals alone."""
     settings = {"goals": "published", **settings}
-    return Experiment(name, title, "parking1", 3, settings, _TWO_MILLION, _FEW_GOALS, document)
+    return Experiment(name, title, "parking1", 3, settings, _TWO_MILLION | (changes or {}), _FEW_GOALS, document)
 
 
 FEW_GOALS = (
     _few_goals("parking1-goal", "one goal", "13 % (PPO)", {"goals": "one"}),
     _few_goals("parking1-goals", "three goals", "92 % (PPO + GAIL)", {}),
-    _few_goals("parking1-goals-starts", "three goals, starts anywhere", "", {"starts": "anywhere"}),
-    _few_goals("parking1-goals-blocks", "three goals, blocks anywhere", "", {"obstacles": "anywhere"}),
+    _few_goals("parking1-goals-both", "three goals, starts and blocks anywhere", "", _ANYWHERE),
     _few_goals(
-        "parking1-goals-both",
-        "three goals, starts and blocks anywhere",
+        "parking1-goals-sharp",
+        "the same, choices sharpened",
         "",
-        {"starts": "anywhere", "obstacles": "anywhere"},
+        _ANYWHERE,
+        {"behavior.hyperparameters.sharpening": 10},
     ),
 )
 QUARTERS = tuple(
@@ -145,6 +148,16 @@ QUARTERS = tuple(
         "",
     )
     for quarter, where in enumerate(("low x, low z", "high x, low z", "low x, high z", "high x, high z"), start=1)
+)
+QUARTER_ANYWHERE = Experiment(
+    "parking1-quarter-2-anywhere",
+    "high x, low z held out; starts and blocks anywhere",
+    "parking1",
+    3,
+    _ANYWHERE | {"quarter": 2},
+    _TWO_MILLION,
+    (Judged("that quarter, as published", _AS_PUBLISHED | {"split": "test"}),),
+    "",
 )
 
 _SPARSE: dict[str, Any] = {
@@ -226,10 +239,35 @@ OTHERS = (
     ),
 )
 
+_HEADLINE_WORDS = """\
+Our recipes (`policies/recipes/`), one core each. New spots lie in cells of 1 m that training never used; each of
+these touches one that it did. What that hides stands [below](#like-for-like-few-goals-and-whole-quarters)."""
+
+_HEADLINE_REMARKS = """\
+All rows of parking but "Parking 1, improved" were trained before cells were set apart for validation: on 540 cells,
+where it now is 495. Of the three seeds of that row the one ships that did best on validation spots: it parks on 97.42
+% (96.89 to 97.87 %) of 4,000 new ones. Tried for it and given up: time that costs nearly twice as much (with less
+sharpening and 8 million steps, one seed): 94.6 % of 4,000 new spots; it hit walls and blocks in 2.6 %."""
+
+_LIKE_FOR_LIKE_WORDS = """\
+The document trained on one goal (PPO) and on three (PPO + GAIL); the rows above on some 500 cells of 1 m all over the
+arena, one of which every test cell touches. Here our recipe for 2 million steps on the document's own goals, judged
+from its start between its blocks; and on goals anywhere but in one quarter of the arena, judged in that quarter. What
+the car sees is relative to it in every row."""
+
+_LIKE_FOR_LIKE_REMARKS = """\
+On few goals the recipe learns few roads: nearly every failure on new spots is a block in the way. Only where starts
+and blocks are others in each episode does it learn to drive around what it sees, and three goals are enough then for
+what the document reports. Sharpening made no difference that three seeds could show. Where the most probable actions
+turn to and fro for ever on one of three goals, they do so in each of its episodes, since the start is the same. Of
+the quarters, the one that holds the start is bridged; in the others the car hits what stands on roads that it was
+never sent down. The worst of them is nearly bridged, too, once starts and blocks are others in each episode. Not
+tried: mirrored episodes."""
+
 SECTIONS: tuple[Section, ...] = (
     Section(
         "The headline",
-        "Our recipes (`policies/recipes/`), one core each. New spots are cells of the arena that training never used.",
+        _HEADLINE_WORDS,
         (ROLLER_BALL, REACH, PARKING1, PARKING1_GAIL, PARKING2, PARKING1_IMPROVED, PARKING2_IMPROVED),
         (
             Image("parking1", "Parking 1: from nothing to parked", {"PPO": "parking1", "PPO + GAIL": "parking1-gail"}),
@@ -240,6 +278,7 @@ SECTIONS: tuple[Section, ...] = (
                 {"Parking 1": "parking1-improved", "Parking 2": "parking2-improved"},
             ),
         ),
+        _HEADLINE_REMARKS,
     ),
     Section(
         "Learning to Drive: five variants",
@@ -266,11 +305,9 @@ SECTIONS: tuple[Section, ...] = (
 
 _LIKE_FOR_LIKE = Section(
     "Like for like: few goals, and whole quarters",
-    "The document trained on one goal (PPO) and on three (PPO + GAIL); the rows above on 495 cells of 1 m all over the "
-    "arena, and nearly every test cell touches one of those. Here our recipe for 2 million steps on the document's own "
-    "goals, judged from its start between its blocks; and on goals anywhere but in one quarter of the arena, judged in "
-    "that quarter. What the car sees is relative to it in every row.",
-    (*FEW_GOALS, *QUARTERS),
+    _LIKE_FOR_LIKE_WORDS,
+    (*FEW_GOALS, *QUARTERS, QUARTER_ANYWHERE),
+    remarks=_LIKE_FOR_LIKE_REMARKS,
 )
 
 _DONE_RIGHT = Section(

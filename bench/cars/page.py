@@ -51,7 +51,7 @@ def write_page(results: Mapping[str, Sequence[Result]]) -> Path:
 def page_text(results: Mapping[str, Sequence[Result]]) -> str:
     """The page without its images."""
     every = [result for runs in results.values() for result in runs]
-    machines = ", ".join(sorted({result.machine for result in every})) or "no machine yet"
+    machines = "; ".join(sorted({result.machine for result in every})) or "no machine yet"
     counts = sorted({evaluated.episodes for result in every for evaluated in result.evaluations})
     episodes = " or ".join(f"{count:,}" for count in counts) or "0"
     parts = [INTRODUCTION.format(episodes=episodes, machine=machines)]

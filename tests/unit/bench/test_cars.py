@@ -1,0 +1,48 @@
+"""The page of the cars is what its recorded runs say, and the policy that ships is the one that was chosen."""
+
+import pytest
+
+from bench.cars.__main__ import RUNS, shipped_seed
+from bench.cars.experiment import NEW_SPOTS, VALIDATION, Experiment
+from bench.cars.experiments import EXPERIMENTS
+from bench.cars.page import DOCS, page_text
+from bench.cars.result import Evaluated, Result, read_all
+from bench.cars.run import configured, with_settings
+from policies.tasks.catalogue import settings_of
+
+
+def recorded():
+    by_name = {}
+    for result in read_all(RUNS):
+        by_name.setdefault(result.experiment, []).append(result)
+    return by_name
+
+
+def test_the_page_is_what_its_recorded_runs_say():
+    assert (DOCS / "cars.md").read_text(encoding="utf-8") == page_text(recorded())
+
+
+def test_recorded_runs_were_judged_on_what_their_experiments_name():
+    for name, runs in recorded().items():
+        labels = [judged.label for judged in EXPERIMENTS[name].judged]
+        assert all([evaluated.label for evaluated in run.evaluations] == labels for run in runs)
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_every_experiment_is_of_a_recipe_and_settings_that_there_are(name):
+    experiment = EXPERIMENTS[name]
+    environment = configured(experiment, 1, "runs").env_settings
+    for judged in experiment.judged:
+        settings_of(environment.env_path, with_settings(environment.env_args, judged.settings))
+
+
+def run(seed, *successes):
+    evaluations = [Evaluated(str(k), count, 100, count, 0.0, {}) for k, count in enumerate(successes)]
+    return Result("some", seed, 1, 1.0, 1, "", 1, [], evaluations)
+
+
+def test_the_seed_that_ships_is_the_best_by_validation_not_by_test():
+    experiment = Experiment("some", "Some", "parking1", judged=(NEW_SPOTS, VALIDATION))
+    assert shipped_seed(experiment, [run(1, 99, 90), run(2, 97, 95), run(3, 98, 95)]) == 2
+    assert shipped_seed(experiment, []) == 1
+    assert shipped_seed(Experiment("other", "Other", "parking1"), [run(1, 80), run(2, 90)]) == 1
