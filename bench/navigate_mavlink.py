@@ -22,8 +22,10 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.vector_pilot import NavigationPilot
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy
-from policies.tasks.intervals import Interval, bootstrap, rate
+from policies.tasks.follow_me.scorecard import written
+from policies.tasks.intervals import bootstrap, rate
 
+ENDS = ("arrived", "collision", "over the forest", "other")
 DENSITIES = (200.0, 400.0, 600.0)
 FLIGHTS = 100  # of each density
 FIRST_SEED = 1_000_003  # odd, as all worlds that are not trained in
@@ -53,15 +55,10 @@ def row(trees_per_ha: float, crossings: Sequence[Crossing]) -> str:
     outcomes = np.array([crossing.outcome for crossing in crossings])
     arrived = [crossing for crossing in crossings if crossing.outcome == "arrived"]
     speeds = np.array([crossing.speed_m_s for crossing in arrived])
-
-    def percent(*names: str) -> str:
-        fraction: Interval = rate(np.isin(outcomes, names))
-        return f"{100 * fraction.value:.1f} % ({100 * fraction.low:.1f} to {100 * fraction.high:.1f})"
-
     mean = bootstrap(len(speeds), lambda rows: float(speeds[rows].mean()) if len(rows) else nan)
-    cells = [f"{trees_per_ha:.0f}", percent("arrived"), f"{mean.value:.2f} m/s ({mean.low:.2f} to {mean.high:.2f})"]
-    cells += [f"{np.median([crossing.miss_m for crossing in arrived] or nan):.1f} m"]
-    cells += [percent("collision"), percent("over the forest"), percent("other")]
+    reached, *ends = (written(rate(outcomes == end), "%") for end in ENDS)
+    rests = f"{np.median([crossing.miss_m for crossing in arrived] or nan):.1f} m"
+    cells = [f"{trees_per_ha:.0f}", reached, written(mean, "m/s"), rests, *ends]
     return "| " + " | ".join(cells) + " |"
 
 

@@ -3,6 +3,7 @@
 Light to import but for `benchmark_of`: a wrong option is told at once.
 """
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -32,6 +33,11 @@ class Benchmark:
     """The figures of a condition, as people read them."""
     misses: Callable[[str, Sequence[Any]], list[str]]
     """What fell short in a condition, a sentence each."""
+
+
+def changed_per_min(interventions: Counter[str] | None, seconds: float) -> float:
+    """Decisions that a guard has changed, per minute; None: there was no guard."""
+    return 60.0 * (interventions or Counter()).total() / max(seconds, 1.0)
 
 
 def benchmark_of(task: str) -> Benchmark:

@@ -11,10 +11,10 @@ import numpy as np
 from autopilot.mavlink.wire.convert import degrees_e7
 from common.attitude import Vector
 from common.geodesy import geodetic_from_ned
+from mission.benchmark.benchmark import changed_per_min
 from mission.flight import Flight
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
-from policies.companion.skills.goal_skill import GoalSkill
 from policies.companion.vehicle_link import COMPONENT
 
 GOAL_RADIUS_M, CEILING_M, SLOWEST_M_S = 3.0, 4.0, 3.0  # of the task Navigate
@@ -65,15 +65,8 @@ def crossed(
     state = f"{companion.phase.value}: {companion.trouble}" if companion.trouble else companion.phase.value
     ended_s = (flight.time_us - begun_us) * 1e-6
     detail = f"{state}, nearest {nearest_m:.1f} m"
-    changes = changed_per_min(companion, ended_s)
+    changes = changed_per_min(companion.skill.interventions, ended_s)
     return Crossing(seed, outcome, speed, dist(last_ned, goal_ned), detail, changes, ended_s)
-
-
-def changed_per_min(companion: Companion, seconds: float) -> float:
-    """Decisions that the guard has changed, per minute; without one, none."""
-    skill = companion.skill
-    guard = skill.guard if isinstance(skill, GoalSkill) else None
-    return 0.0 if guard is None else 60.0 * sum(guard.interventions.values()) / max(seconds, 1.0)
 
 
 def send_goto(flight: Flight, goal_ned: Vector) -> None:

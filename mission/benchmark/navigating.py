@@ -50,7 +50,7 @@ class Forest:
 
 CONDITIONS = {
     f"{trees}-late-{lag_ms}": Forest(trees, lag_ms * 1e-3, reached, collided)
-    for trees, reached, collided in ((200, 0.97, 0.01), (400, 0.95, 0.02), (600, 0.92, 0.03))
+    for trees, reached, collided in ((200, 0.99, 0.01), (400, 0.97, 0.02), (600, 0.93, 0.03))
     for lag_ms in (0, 100, 200)
 }
 

@@ -10,8 +10,7 @@ from math import nan
 
 import numpy as np
 
-from mission.benchmark.benchmark import Benchmark
-from mission.benchmark.goal_flights import changed_per_min
+from mission.benchmark.benchmark import Benchmark, changed_per_min
 from mission.benchmark.goal_pilots import goal_pilot
 from mission.flight_config import FlightConfig
 from mission.follow.lockstep import flight_with_driver
@@ -96,7 +95,7 @@ def parked(pilot: DrivingPilot, lot: Lot, seed: int, guard: GuardSettings) -> Pa
         if running.error is not None:
             return Parking(seed, "missed", nan, nan, nan, 0.0, str(running.error))
         a: Arrival = running.result
-        changes = changed_per_min(companion, a.seconds)
+        changes = changed_per_min(companion.skill.interventions, a.seconds)
         return Parking(seed, a.outcome, a.seconds, a.distance_m, a.turn_deg, changes, a.why)
     finally:
         flight.close()

@@ -258,10 +258,10 @@ def summary_of(card: Scorecard) -> dict[str, float | None]:
 
 def guard_text(companion: Companion) -> str:
     """What a guard has changed of the decisions, most frequent first."""
-    guard = getattr(companion.skill, "guard", None)
-    if guard is None:
+    interventions = companion.skill.interventions
+    if interventions is None:
         return "no guard"
-    reasons = ", ".join(f"{count} {reason}" for reason, count in guard.interventions.most_common())
+    reasons = ", ".join(f"{count} {reason}" for reason, count in interventions.most_common())
     return f"decisions that the guard changed: {reasons or 'none'}; of {companion.decision_count}"
 
 

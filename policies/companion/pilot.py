@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from common.attitude import Vector
 from policies.companion.belief import owner_belief
 from policies.companion.names import SCRIPTED, TASK
-from policies.companion.skills.following import TRACKED, Pilot
+from policies.companion.skills.following import Pilot
 from policies.experts.follower import ScriptedFollower
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import CheckpointError, find_policy
@@ -26,6 +26,7 @@ from policies.tasks.follow_me.observe import (
     IMAGE_CHANNELS,
     IMAGE_SIZE,
     LAYOUT_VERSION,
+    TRACKED,
     vector_elements,
 )
 from policies.tasks.follow_me.tracked.vector import TRACKED_ELEMENTS
@@ -101,7 +102,7 @@ class TrackedPilot:
     """
 
     image_shape = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))  # of the senses
-    kind = TRACKED
+    kind = int(TRACKED)
 
     def __init__(self, policy: Policy, source: str) -> None:
         try:

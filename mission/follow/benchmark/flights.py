@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mission.benchmark.benchmark import changed_per_min
 from mission.flight_config import FlightConfig, OwnerConfig
 from mission.follow.benchmark.conditions import Condition
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.lockstep import flight_with_companion, follow_for
 from policies.companion.guard.settings import GuardSettings
-from policies.companion.skills.following import Following, Pilot
+from policies.companion.skills.following import Pilot
 from policies.tasks.follow_me.track import Ranges, spans
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
@@ -77,9 +78,6 @@ def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, sec
     distance, speed = track.distance_m[: len(rows)], np.hypot(north, east)
     bounds = Ranges()
     is_in_band = (distance >= bounds.near_m) & (distance <= bounds.far_m)
-    skill = companion.skill
-    held = skill.guard if isinstance(skill, Following) else None
-    changes = sum(held.interventions.values()) if held is not None else 0
     smoothness = watch.smoothness()
     hidden = is_hidden > 0.0
     return Outcome(
@@ -91,7 +89,7 @@ def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, sec
         nearest_hidden_m=float(distance[hidden].min()) if hidden.any() else nan,
         has_stood=_has_stood(hidden, speed, track.interval_s),
         has_resumed=_has_resumed(hidden, is_in_band, track.interval_s),
-        interventions_per_min=60.0 * changes / max(len(rows) * track.interval_s, 1.0),
+        interventions_per_min=changed_per_min(companion.skill.interventions, len(rows) * track.interval_s),
         accel_rms=smoothness.accel_rms,
         yaw_rate_rms=smoothness.yaw_rate_rms,
         ended_s=float(track.time_s[-1]),

@@ -27,7 +27,9 @@ def misses(name: str, outcomes: Sequence[Outcome]) -> list[str]:
         found.append(f"{condition.title}: {band:.1%} of the time in the band, wanted {condition.least_in_band:.0%}")
     hits = sum(outcome.is_collided for outcome in outcomes)
     if hits:
-        found.append(f"{condition.title}: {hits} of {len(outcomes)} flights touched somebody or something")
+        people = sum(outcome.is_somebody_hit for outcome in outcomes)
+        touched = f"touched somebody or something, {people} of them somebody"
+        found.append(f"{condition.title}: {hits} of {len(outcomes)} flights {touched}")
     nearest_m = min((o.nearest_hidden_m for o in outcomes if o.nearest_hidden_m == o.nearest_hidden_m), default=9.0)
     if condition.least_m is not None and nearest_m < condition.least_m:
         found.append(f"{condition.title}: {nearest_m:.2f} m from a hidden owner, wanted {condition.least_m:g}")

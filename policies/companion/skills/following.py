@@ -4,6 +4,7 @@ A decision ten times a second: on each new image, and where none comes in time o
 then. A guard that does not believe the pilot bounds what it asks for. Where the owner is lost, it does not fly.
 """
 
+from collections import Counter
 from math import isclose
 from typing import Protocol
 
@@ -21,7 +22,7 @@ from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.tracked_observer import TrackedObserver
 from policies.companion.vehicle_link import Own, Owner, VehicleLink
-from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, TILT_DEG
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, TILT_DEG, TRACKED
 
 DECISION_US = 100_000
 DECISION_EARLY_US = 50_000  # an image may come this much earlier than the decision period asks
@@ -32,7 +33,6 @@ OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not se
 NO_IMAGES = "no new pictures"
 LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the images that policies are trained on
 STANDING = (Stance.STOP, Stance.SEARCH, Stance.BLIND)
-TRACKED = 3  # the vector of policies.tasks.follow_me.tracked.vector
 LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view
 
 
@@ -91,6 +91,10 @@ class Following:
         self._is_new = False  # there is an image that was not decided on
         self._has_looked = False  # at the newest image
         self._is_tracked = False  # the tracker has been told of it
+
+    @property
+    def interventions(self) -> Counter[str] | None:
+        return None if self.guard is None else self.guard.interventions
 
     def attach(self, vehicle: VehicleLink) -> None:
         """Hears nothing that the link does not know of by itself; tells the pilot what the guard does."""

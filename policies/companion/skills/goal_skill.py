@@ -5,6 +5,7 @@ guard that does not believe the policy bounds what it asks for; where no scan co
 which is older then.
 """
 
+from collections import Counter
 from typing import Protocol
 
 import numpy as np
@@ -57,6 +58,10 @@ class GoalSkill:
         self.guard = guard
         self._stance = GoalStance.FREE  # as told
         self._is_flying = False
+
+    @property
+    def interventions(self) -> Counter[str] | None:
+        return None if self.guard is None else self.guard.interventions
 
     def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
         self.goals.frame(time_us)

@@ -4,6 +4,7 @@ The companion itself (companion.py) knows the link, who flies and when setpoints
 task, and who decides.
 """
 
+from collections import Counter
 from typing import Protocol
 
 import numpy as np
@@ -31,6 +32,11 @@ class Skill(Protocol):
     @property
     def camera(self) -> ImageSource | None:
         """What it sees by; None: by ranges alone."""
+        ...
+
+    @property
+    def interventions(self) -> Counter[str] | None:
+        """How many decisions its guard has changed, by the reason; None: it has no guard."""
         ...
 
     def attach(self, vehicle: VehicleLink) -> None:

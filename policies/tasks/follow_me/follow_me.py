@@ -21,7 +21,6 @@ from policies.tasks.follow_me.cast import PEOPLE_MAX
 from policies.tasks.follow_me.follow_me_kernels import (
     ACT_TICKS,
     MEASURES,
-    TRACKED,
     FollowState,
     Rules,
     act,
@@ -49,6 +48,7 @@ from policies.tasks.follow_me.observe import (
     EGO_BLIND,
     IMAGE_CHANNELS,
     LAYOUT_VERSION,
+    TRACKED,
     vector_elements,
 )
 from policies.tasks.follow_me.owner_visibility import Sight

@@ -35,7 +35,7 @@ from policies.tasks.follow_me.cast import (
     phone_of,
 )
 from policies.tasks.follow_me.follow_me_params import FollowParams
-from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, document_action, write_vector
+from policies.tasks.follow_me.observe import REPORT_OLD_S, TRACKED, OwnerReport, document_action, write_vector
 from policies.tasks.follow_me.owner_visibility import Sight, lens_in, reach_from, see
 from policies.tasks.follow_me.privileged import write_privileged
 from policies.tasks.follow_me.reward import document_reward, follow_outcome, follow_reward, is_in_band
@@ -56,7 +56,6 @@ _STEP_TICKS = wp.constant(PERSON_TICKS)
 _TICKS_PER_S = wp.constant(1.0 / TICK_S)
 _PART_S = wp.constant(ACT_TICKS * TICK_S)
 _PRIVILEGED = wp.constant(-1)
-TRACKED = wp.constant(3)  # beside the vectors of observe.py
 _DISTANCE_STREAM = wp.constant(6)
 _BEARING_STREAM = wp.constant(7)
 _HEADING_STREAM = wp.constant(8)

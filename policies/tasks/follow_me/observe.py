@@ -36,6 +36,7 @@ LAYOUT_VERSION = 2  # 1: without the picture's age
 EGO = wp.constant(0)  # relative to the vehicle, owner's report included
 EGO_BLIND = wp.constant(1)  # the same without any word of the owner: `vision-only`
 DOCUMENT = wp.constant(2)  # the document's seven numbers
+TRACKED = wp.constant(3)  # what senses know, and no image: tracked/vector.py
 
 DOCUMENT_SPEED_M_S = wp.constant(3.0)  # unpublished; guess, below the drone package's limit of 5
 DOCUMENT_CLIMB_M_S = wp.constant(1.0)  # unpublished; guess
