@@ -3,7 +3,7 @@
 In: a policy and settings of FollowMe. Out: a scorecard of each cell, and of each speed over all densities.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,8 +27,12 @@ def judge_in_batch(policy: Policy, settings: FollowSettings, cells: Sequence[Cel
     """Scorecards on the test split, the estimator in the loop."""
     held_out = settings.model_copy(update={"split": "test", "has_estimator": True, "terrain": "fresh"})
     task = FollowMe(held_out, EPISODES)
-    flown = {cell: _fly(policy, task, cell) for cell in cells}
-    return scorecards({cell: tracks for cell, (tracks, _) in flown.items()}, {c: r for c, (_, r) in flown.items()})
+    tracks, returns = {}, {}
+    for cell in cells:
+        trees, speed = cell.trees_per_ha, cell.owner_speed_max
+        flown, returns[cell] = first_episodes(policy, task, {"trees_per_ha": trees, "owner_speed_max": speed})
+        tracks[cell] = [replace(track, trees_per_ha=trees, owner_speed_max=speed) for track in flown]
+    return scorecards(tracks, returns)
 
 
 def scorecards(
@@ -46,9 +50,9 @@ def scorecards(
     return judged
 
 
-def _fly(policy: Policy, task: FollowMe, cell: Cell) -> tuple[list[Track], float]:
+def first_episodes(policy: Policy, task: FollowMe, numbers: Mapping[str, float]) -> tuple[list[Track], float]:
     """The first episode of every environment, by the most probable actions; their tracks and mean reward."""
-    task.set_params({"trees_per_ha": cell.trees_per_ha, "owner_speed_max": cell.owner_speed_max})
+    task.set_params(numbers)
     task.reset(HELD_OUT_SEED)
     tensors, recording = TaskTensors(task), Recording(task)
     memory = policy.start_memory(task.env_count)
@@ -59,6 +63,4 @@ def _fly(policy: Policy, task: FollowMe, cell: Cell) -> tuple[list[Track], float
             recording.record()
             is_over = tensors.is_terminated | tensors.is_truncated
             memory = memory.masked_fill(is_over[:, None], 0.0) if memory.shape[1] else memory
-    trees, speed = cell.trees_per_ha, cell.owner_speed_max
-    tracks = [replace(track, trees_per_ha=trees, owner_speed_max=speed) for track in recording.tracks()]
-    return tracks, float(np.mean(recording.returns))
+    return recording.tracks(), float(np.mean(recording.returns))
