@@ -54,14 +54,16 @@ reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policy from nothing,
 reproduce-drive: $(STAMP) ## Train and judge the policies of docs/results/drive.md (half an hour); only judge: ARGS="judge"
 	@$(BIN)/python -m bench.drive $(ARGS)
 
-# loadfile keeps a test file's kernels in one process, so that each is compiled once. Bytecode is kept, also where the
-# environment says otherwise: tests start the command a hundred times, and their own files take longest to prepare.
+# loadfile keeps a test file's kernels in one process, so that each is compiled once; it would wait for ever for the
+# successor of a worker that died, so there is none. Bytecode is kept, also where the environment says otherwise: tests
+# start the command a hundred times, and their own files take longest to prepare.
+WORKERS := -n 2 --dist loadfile --max-worker-restart 0
 test test-all: export PYTHONDONTWRITEBYTECODE =
 test: $(STAMP) ## Run the tests that take seconds; flags: make test ARGS="-k plan"
-	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow" tests $(ARGS)
+	$(BIN)/python -m pytest -q $(WORKERS) -m "not slow" tests $(ARGS)
 
 test-all: $(STAMP) ## Run every test, the slow ones too
-	$(BIN)/python -m pytest -q -n 2 --dist loadfile tests $(ARGS)
+	$(BIN)/python -m pytest -q $(WORKERS) tests $(ARGS)
 
 golden: $(STAMP) ## Renew tests/golden/golden.json and show what has changed in the golden flights; flags: ARGS="--check"
 	@$(BIN)/python -m tests.golden $(ARGS)

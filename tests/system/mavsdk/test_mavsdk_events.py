@@ -6,7 +6,7 @@ import re
 import pytest
 from mavsdk.plugins.action import Action
 from mavsdk.plugins.component_metadata import ComponentMetadata, MetadataType
-from mavsdk.plugins.events import Events, EventsError
+from mavsdk.plugins.events import Events
 
 from mission.flight import FlightConfig
 from tests.system.raw_vehicle import OPEN, RawVehicle
@@ -22,13 +22,6 @@ def vehicle(tmp_path_factory):
             yield vehicle
 
 
-def report_of(events):
-    try:
-        return events.get_health_and_arming_checks_report()
-    except EventsError:
-        return None
-
-
 def test_parameters_are_described(vehicle):
     metadata, found = vehicle.plugin(ComponentMetadata), {}
     metadata.subscribe_metadata_available(lambda update, _: found.update({update.type: update.json_metadata}))
@@ -42,11 +35,13 @@ def test_parameters_are_described(vehicle):
 
 
 def test_arming_checks_and_events_have_texts(vehicle):
-    events, reported = vehicle.plugin(Events), []
+    events, reported, reports = vehicle.plugin(Events), [], []
     events.subscribe_events(lambda event, _: reported.append((event.event_name, event.message)))
+    # asking for the report instead races MAVSDK's own thread, which writes it without a lock
+    events.subscribe_health_and_arming_checks(lambda report, _: reports.append(report))
     vehicle.until(lambda: vehicle.state.is_ready_to_arm, 30.0, "ready")
-    vehicle.until(lambda: (report := report_of(events)) and not report.all_problems, 60.0, "reported as ready")
-    report = report_of(events)
+    vehicle.until(lambda: reports and not reports[-1].all_problems, 60.0, "reported as ready")
+    report = reports[-1]
     assert report.current_mode_intention.mode_name == "Hold"
     assert report.current_mode_intention.can_arm_or_run
     assert {"gps", "battery", "imu"} <= {each.name for each in report.health_components}
@@ -54,8 +49,8 @@ def test_arming_checks_and_events_have_texts(vehicle):
 
     vehicle.flight.params.set("COM_POS_FS_EPH", 0.5)  # less than the receiver can give
     vehicle.until(lambda: not vehicle.state.is_ready_to_arm, 5.0, "too inaccurate")
-    vehicle.until(lambda: report_of(events).all_problems, 10.0, "reported as too inaccurate")
-    report = report_of(events)
+    vehicle.until(lambda: reports[-1].all_problems, 10.0, "reported as too inaccurate")
+    report = reports[-1]
     assert not report.current_mode_intention.can_arm_or_run
     problem = report.current_mode_intention.problems[0]
     assert re.fullmatch(r"Estimator: horizontal accuracy 0\.\d m, 0\.5 m needed", problem.message)
