@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from common.attitude import wrapped, yaw_of
 from policies.companion.guard.limits import (
     CLIMB_M_S,
+    closing_max,
     faded,
     kept_off,
     stopping_speed,
     within_heights,
-    within_room,
 )
+from policies.companion.guard.rollouts import Somebody, clear_velocity
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
@@ -57,13 +58,14 @@ class Guard:
         self.interventions: Counter[str] = Counter()
         """How many decisions were changed, by the reason."""
         self._begun_us = 0  # when the policy took over, on the vehicle's clock
-        self._way = np.zeros(2)  # unit, to where the owner is now
-        self._is_pressed = self._is_too_near = False
+        self._flown = np.zeros(2)  # what was let be flown last
+        self._is_too_near = False
 
     def begin(self, own: Own) -> None:
         """The policy takes over."""
         self.stance = Stance.FREE
         self._begun_us = own.boot_us
+        self._flown = np.array(own.vel_ned[:2])
 
     def is_lost(self, own: Own) -> bool:
         """Whether the owner was not seen for so long that it is the end; who has just begun may look for them first."""
@@ -85,9 +87,8 @@ class Guard:
             scale = faded(silence_s, s.slow_s, s.stop_s) * faded(age_s, s.image_slow_s, s.image_stop_s)
             level, down = scale * level, scale * down
             self.interventions[self.stance.value] += 1
-        delay_s = s.reaction_s + age_s
-        level = self._past_owner(level, own, s.reaction_s)
-        level = self._past_solids(level, own, delay_s)
+        level, owner = self._past_owner(level, own)
+        level = self._flown = self._past_solids(level, own, owner)
         down = self._within_heights(down, own)
         return (float(level[0]), float(level[1]), float(down)), yaw_rate
 
@@ -123,35 +124,31 @@ class Guard:
         error = wrapped(bearing_rad - yaw_of(own.q_ned_from_frd))
         return float(np.clip(_FACE_GAIN * error, -_YAW_MAX, _YAW_MAX))
 
-    def _past_owner(self, level: Floats, own: Own, delay_s: float) -> Floats:
-        known = self.senses.owner_now(own)
-        self._is_pressed = self._is_too_near = False
+    def _past_owner(self, level: Floats, own: Own) -> tuple[Floats, Somebody | None]:
+        """The velocity without what brings it too near to the owner, and what it has to do with them."""
+        known, s = self.senses.owner_now(own), self.settings
+        self._is_too_near = False
         if known is None:
-            return level
+            return level, None
         way = known[0][:2] - np.array(own.pos_ned[:2])
-        vel = known[1][:2]
+        vel, own_vel = known[1][:2], np.array(own.vel_ned[:2])
         far_m = float(np.hypot(*way))
-        self._way = way / max(far_m, 1e-3)
-        own_vel = np.array(own.vel_ned[:2])
-        coming_m_s = float((own_vel - vel) @ self._way)
-        self._is_pressed = far_m - delay_s * max(coming_m_s, 0.0) < self.settings.pressed_m
-        self._is_too_near = far_m - delay_s * max(coming_m_s, 0.0) < self.settings.owner_m
-        kept = kept_off(level, way, own_vel, vel, delay_s, self.settings)
+        unit = way / max(far_m, 1e-3)
+        then_m = far_m - s.reaction_s * max(float((own_vel - vel) @ unit), 0.0)
+        self._is_too_near = then_m < s.owner_m
+        owner = Somebody(unit, closing_max(way, own_vel, vel, s.reaction_s, s), then_m < s.pressed_m)
+        kept = kept_off(level, unit, owner.closing_max)
         self._count("near the owner", level, kept)
-        return kept
+        return kept, owner
 
-    def _past_solids(self, level: Floats, own: Own, delay_s: float) -> Floats:
-        s = self.settings
-        if not self.senses.map.has_depth:
-            speed = float(np.hypot(*level))
-            kept = level * min(1.0, s.no_depth_speed / max(speed, 1e-6))
-            self._count("no depth", level, kept)
-            return np.asarray(kept)
-        free_m, known_m = self.senses.map.clear_m(own.pos_ned, own.boot_us)
-        if self._is_pressed:  # back into what is not seen rather than wait for who comes
-            free_m = np.where(self.senses.map.units @ self._way < 0.0, known_m, free_m)
-        kept = within_room(level, self.senses.map.units, free_m, known_m, delay_s, s)
-        self._count("near something", level, kept)
+    def _past_solids(self, level: Floats, own: Own, owner: Somebody | None) -> Floats:
+        s, around = self.settings, self.senses.map
+        slower = level
+        if not around.has_depth:
+            slower = level * min(1.0, s.no_depth_speed / max(float(np.hypot(*level)), 1e-6))
+            self._count("no depth", level, slower)
+        kept = clear_velocity(slower, self._flown, own, around, s, owner)
+        self._count("near something", slower, kept)
         return kept
 
     def _within_heights(self, down: float, own: Own) -> float:

@@ -26,61 +26,29 @@ def braking_speed(free_m: float, own_m_s: float, delay_s: float, brake: float) -
     return min(most, stopping_speed(free_m - delay_s * max(own_m_s, 0.0), 0.0, brake))
 
 
-def kept_off(
-    velocity: Floats, way: Floats, own_vel: Floats, other_vel: Floats, delay_s: float, s: GuardSettings
-) -> Floats:
-    """A level velocity without what would bring it too near to somebody.
+def closing_max(way: Floats, own_vel: Floats, other_vel: Floats, delay_s: float, s: GuardSettings) -> float:
+    """How fast it may come nearer to somebody [m/s]; negative: it has to give way.
 
     Args:
-        velocity: wanted [m/s], north and east.
         way: from here to them [m].
         own_vel: [m/s] of now, which it has until it answers.
         other_vel: [m/s] theirs; who goes away may stop meanwhile.
         delay_s: until it answers.
         s: of the guard.
     """
-    far_m = float(np.hypot(*way))
-    if far_m < 1e-3:
-        return np.zeros(2)
+    far_m = max(float(np.hypot(*way)), 1e-3)
     unit = way / far_m
     leaving = float(other_vel @ unit)
     trusted = leaving if leaving < 0.0 else max(leaving - _STOPS_M_S2 * delay_s - _DOUBT_M_S, 0.0)
     room_m = far_m - s.owner_m - delay_s * max(float(own_vel @ unit) - leaving, 0.0)
     if room_m > 0.0:
-        most = trusted + stopping_speed(room_m, 0.0, s.owner_brake)
-    else:
-        most = max(trusted + _BACK_GAIN * room_m, -_BACK_MAX_M_S)
-    closing = float(velocity @ unit)
-    return velocity - max(closing - most, 0.0) * unit
+        return trusted + stopping_speed(room_m, 0.0, s.owner_brake)
+    return max(trusted + _BACK_GAIN * room_m, -_BACK_MAX_M_S)
 
 
-def within_room(
-    velocity: Floats, units: Floats, free_m: Floats, known_m: Floats, delay_s: float, s: GuardSettings
-) -> Floats:
-    """The level velocity nearest to the wanted one that can be stopped within the free way in its direction.
-
-    Args:
-        velocity: wanted [m/s], north and east.
-        units: directions, (directions, 2).
-        free_m: free way in each.
-        known_m: way without anything that is known to be solid: slowly it may go where it has not looked.
-        delay_s: until it answers.
-        s: of the guard.
-    """
-    wanted = float(np.hypot(*velocity))
-    if wanted < 1e-6:
-        return velocity
-    most, creeping = (
-        np.array([stopping_speed(m - s.solid_m, delay_s, s.brake) for m in room_m]) for room_m in (free_m, known_m)
-    )
-    most = np.maximum(most, np.minimum(creeping, s.unseen_speed))
-    k = np.argmax(units @ velocity)
-    if most[k] >= wanted:
-        return velocity
-    along = np.clip(units @ velocity, 0.0, most)
-    off = np.hypot(*(along[:, None] * units - velocity).T)
-    best = int(np.argmin(off))
-    return np.asarray(along[best] * units[best])
+def kept_off(velocity: Floats, unit: Floats, most: float) -> Floats:
+    """A level velocity without what is faster towards somebody than it may be [m/s]."""
+    return velocity - max(float(velocity @ unit) - most, 0.0) * unit
 
 
 def way_along_m(points: Floats, curvature: float, is_backwards: bool, s: GuardSettings) -> float:

@@ -5,6 +5,8 @@ level, by an acceleration that it is taken to have. What is clear is so from the
 one of them can go on taking it.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,12 +17,27 @@ from policies.companion.vehicle_link import Own
 Floats = NDArray[np.float64]
 _FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the speed that is wanted
 _TURNS = np.arange(-17, 19) * (np.pi / 18.0)
-_STEP_S, _STEPS = 0.05, 90
-_NEARER_M = 0.1  # who is too near already may come so much nearer on the way out
+_STEP_S, _STEPS = 0.05, 90  # coarser, it would pass over a trunk
+_NEARER_M = 0.1  # who is too near already may come so much nearer on the way out,
+_NEAREST_M = 0.15  # but by no more than this too near
 _STEADY = 0.3  # how much what was flown last counts beside what is wanted: not left, right and left again
 
 
-def clear_velocity(wanted: Floats, last: Floats, own: Own, around: LocalMap, s: GuardSettings) -> Floats:
+@dataclass(frozen=True)
+class Somebody:
+    """A person near the vehicle."""
+
+    way: Floats
+    """Unit, from the vehicle to them, north and east."""
+    closing_max: float
+    """[m/s] towards them; negative: it has to give way."""
+    is_pressing: bool
+    """So near that it rather goes back to where it has not looked than waits for them."""
+
+
+def clear_velocity(
+    wanted: Floats, last: Floats, own: Own, around: LocalMap, s: GuardSettings, person: Somebody | None = None
+) -> Floats:
     """The level velocity nearest to the wanted one [m/s] whose rollout is clear; if none is, the longest clear one.
 
     Args:
@@ -29,15 +46,20 @@ def clear_velocity(wanted: Floats, last: Floats, own: Own, around: LocalMap, s: 
         own: telemetry.
         around: what is known.
         s: of the guard.
+        person: who is kept off besides; the wanted velocity does so.
     """
-    asked = _candidates(wanted, last)
+    asked = _candidates(wanted, last, s.unseen_speed)
     own_vel = np.array(own.vel_ned[:2])
     points = np.array(own.pos_ned[:2]) + _rolled(asked, own_vel, last, s)
     near_m, is_seen = around.room(points, own.pos_ned, own.boot_us)
     here_m = float(near_m[0, 0])
-    is_slow = np.hypot(asked[:, 0], asked[:, 1]) <= s.unseen_speed
-    is_blocked = (near_m < min(s.solid_m, here_m - _NEARER_M)) | ~(is_seen | is_slow[:, None])
+    may_be_unseen = np.hypot(asked[:, 0], asked[:, 1]) <= s.unseen_speed + 1e-6
+    if person is not None and person.is_pressing:
+        may_be_unseen |= asked @ person.way < 0.0
+    is_blocked = (near_m < _room_m(here_m, s.solid_m)) | ~(is_seen | may_be_unseen[:, None])
     clear_steps = np.where(is_blocked.any(1), np.argmax(is_blocked, axis=1), _STEPS + 1)
+    if person is not None:
+        clear_steps[asked @ person.way > person.closing_max + 1e-6] = -1
     cost = np.hypot(*(asked - wanted).T) + _STEADY * np.hypot(*(asked - last).T)
     cost[0] = 0.0  # what is wanted, if it is clear
     if (clear_steps > _STEPS).any():
@@ -46,13 +68,22 @@ def clear_velocity(wanted: Floats, last: Floats, own: Own, around: LocalMap, s: 
     return np.asarray(asked[int(np.argmax(clear_steps - 1e-3 * np.hypot(asked[:, 0], asked[:, 1])))])
 
 
-def _candidates(wanted: Floats, last: Floats) -> Floats:
+def _room_m(here_m: float, solid_m: float) -> float:
+    """What a rollout has to keep off [m], of who is so near to something now."""
+    if here_m >= solid_m:
+        return solid_m
+    return max(here_m - _NEARER_M, min(here_m, solid_m - _NEAREST_M))
+
+
+def _candidates(wanted: Floats, last: Floats, unseen_speed: float) -> Floats:
     """The wanted velocity, that of before, the wanted one turned and slower, and none; shape (candidates, 2)."""
     cos, sin = np.cos(_TURNS), np.sin(_TURNS)
     north, east = wanted
     turned = np.stack([cos * north - sin * east, sin * north + cos * east], -1)
-    slower = np.concatenate([fraction * turned for fraction in _FRACTIONS])
-    before = last * min(1.0, float(np.hypot(*wanted)) / max(float(np.hypot(*last)), 1e-6))
+    speed = max(float(np.hypot(*wanted)), 1e-6)
+    creeping = min(unseen_speed / speed, 1.0)
+    slower = np.concatenate([fraction * turned for fraction in (*_FRACTIONS, creeping)])
+    before = last * min(1.0, speed / max(float(np.hypot(*last)), 1e-6))
     return np.concatenate([wanted[None], before[None], slower, np.zeros((1, 2))])
 
 

@@ -6,6 +6,7 @@ What has not been seen is not free.
 
 from math import hypot
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,18 +17,17 @@ from policies.tasks.follow_me.tracked.vector import SECTORS
 
 CELL_M = 0.25
 CELLS = 96  # of a side: 12 m to each
-DIRECTIONS = 36
 ROOM_M = 1.0  # more room about a place is not told
 REACH_M = 10.0  # farther nothing is asked for
 _ABOVE_M, _BELOW_M = 0.7, 0.4  # of the slice that the vehicle flies through; guess: its own height twice
 _NO_RETURN_M = 4.0  # so far a column without any return is taken to be free, if others have some; guess
 _HOLD_US = 6_000_000  # for so long what was seen counts
 _OWNER_M = 0.7  # round the owner, who is no part of the map
+_LEAD_S = 1.0  # nobody runs into what they reach in so long; guess
 _ALIVE = 0.05  # fraction of pixels with depth below which there is none
 _UNSEEN = -(10**15)
 _OWN_M = 0.75  # so near nothing is seen: what is not known to be solid is taken to be free,
 _HULL_M = 0.35  # and where the vehicle itself is, nothing else is
-_HALF_WIDTH_M = 0.4  # of the vehicle's way
 _RAYS = 5  # of a sector of ranges: a cell apart at the edge of what is asked for
 
 Floats = NDArray[np.float64]
@@ -46,21 +46,14 @@ class LocalMap:
         near = np.arange(-_OWN_M, _OWN_M + CELL_M, CELL_M)
         self._own = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _OWN_M])
         self._hull = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _HULL_M])
-        along = np.arange(CELL_M, REACH_M, CELL_M)
-        aside = np.array([-_HALF_WIDTH_M, 0.0, _HALF_WIDTH_M])
-        angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
-        self.units = np.stack([np.cos(angles), np.sin(angles)], -1)
-        """Directions asked about, north and east."""
-        across = np.stack([-self.units[:, 1], self.units[:, 0]], -1)
-        self._probes = along[None, :, None, None] * self.units[:, None, None] + aside[:, None] * across[:, None, None]
 
-    def see(self, pixels: NDArray[np.uint8], pose: Pose, owner_ned: Vector | None, now_us: int) -> None:
+    def see(self, pixels: NDArray[np.uint8], pose: Pose, owner: tuple[Floats, Floats] | None, now_us: int) -> None:
         """Takes in a picture.
 
         Args:
             pixels: (height, width, 4), the last channel depth.
             pose: of the vehicle when it was taken.
-            owner_ned: [m] who is left out.
+            owner: place [m] and level velocity [m/s] then of who is left out, ned.
             now_us: the vehicle's clock.
         """
         byte = pixels[..., 3].astype(np.float64)
@@ -73,24 +66,30 @@ class LocalMap:
         rotation = np.array([rotated(pose.q_ned_from_frd, axis) for axis in np.eye(3).tolist()]).T
         rays_ned = self._rays_frd @ rotation.T  # of depth 1
         points = rays_ned * depth_m[..., None]
-        is_level = (points[..., 2] > -_ABOVE_M) & (points[..., 2] < _BELOW_M)
-        is_solid = is_return & is_level
-        if owner_ned is not None:
-            off = points[..., :2] + np.array(pose.pos_ned[:2]) - np.array(owner_ned[:2])
-            is_solid &= np.hypot(off[..., 0], off[..., 1]) > _OWNER_M
         here = np.array(pose.pos_ned[:2])
         level_m = np.hypot(points[..., 0], points[..., 1])
-        self._carve(here, rays_ned, np.where(is_solid, level_m, np.inf).min(0), is_return & is_level, now_us)
-        rows, columns = self._cells(points[..., :2][is_solid & (level_m < REACH_M)] + here)
+        is_there = is_return & (points[..., 2] > -_ABOVE_M) & (points[..., 2] < _BELOW_M)
+        self._carve(here, rays_ned, np.where(is_there, level_m, np.inf).min(0), now_us)
+        is_solid = is_there & (level_m < REACH_M)
+        if owner is not None:
+            off = points[..., :2] + here - owner[0][:2]
+            is_solid &= np.hypot(off[..., 0], off[..., 1]) > _OWNER_M
+            self._open_ahead(*owner, now_us)
+        rows, columns = self._cells(points[..., :2][is_solid] + here)
         self._solid_us[rows, columns] = now_us
 
-    def _carve(self, here: Floats, rays_ned: Floats, solid_m: Floats, is_seen: NDArray[np.bool_], now_us: int) -> None:
-        """Notes as free what lies before the first solid thing of each column."""
+    def _carve(self, here: Floats, rays_ned: Floats, first_m: Floats, now_us: int) -> None:
+        """Notes as free what lies before the first thing in each column, a body too: what it hides is unknown."""
         level = rays_ned[IMAGE_SIZE // 2, :, :2]
         units = level / np.hypot(level[:, 0], level[:, 1])[:, None]
-        free_m = np.where(np.isfinite(solid_m), solid_m - CELL_M, _NO_RETURN_M)
-        far = ~np.isfinite(solid_m) & is_seen.any(0)  # only the owner, or the ground that rises
-        self._open(here, units, np.where(far, REACH_M, free_m), now_us)
+        self._open(here, units, np.where(np.isfinite(first_m), first_m - CELL_M, _NO_RETURN_M), now_us)
+
+    def _open_ahead(self, place: Floats, velocity: Floats, now_us: int) -> None:
+        """Notes as free, but for what is known to be solid, where somebody walks: they look where they go."""
+        along = np.arange(0.0, _LEAD_S + 0.04, 0.04)[:, None, None] * velocity[:2]
+        rows, columns = self._cells((place[:2] + along + self._hull).reshape(-1, 2))
+        is_open = self._solid_us[rows, columns] <= now_us - _HOLD_US
+        self._free_us[rows[is_open], columns[is_open]] = now_us
 
     def sweep(
         self, bearings_rad: Floats, width_rad: float, ranges_m: Floats, limit_m: float, pose: Pose, now_us: int
@@ -129,19 +128,16 @@ class LocalMap:
         is_solid = self._solid_us[rows, columns] > now_us - _HOLD_US
         self._free_us[rows[~is_solid], columns[~is_solid]] = now_us
 
-    def clear_m(self, pos_ned: Vector, now_us: int) -> tuple[Floats, Floats]:
-        """How far the way of the vehicle is free in each of `units`, and how far nothing solid is known in it [m].
-
-        Shapes (DIRECTIONS,) each.
-        """
-        self._follow(pos_ned)
-        points = self._probes + np.array(pos_ned[:2])
-        rows, columns = self._cells(points.reshape(-1, 2))
-        then = now_us - _HOLD_US
-        free, solid = self._free_us[rows, columns], self._solid_us[rows, columns]
-        is_solid = (solid > then) & (solid >= free)
-        is_free = (free > then) & ~is_solid
-        return self._length_m(is_free), self._length_m(~is_solid)
+    def sight(self, pose: Pose, there_ned: Floats, now_us: int) -> None:
+        """Notes as free what lies between the vehicle at a pose and what it saw at a place."""
+        self._follow(pose.pos_ned)
+        here = np.array(pose.pos_ned[:2])
+        way = np.array(there_ned[:2]) - here
+        far_m = float(np.hypot(*way))
+        unit = way / max(far_m, 1e-3)
+        aside = np.array([-unit[1], unit[0]]) * CELL_M
+        for start in (here - aside, here, here + aside):
+            self._open(start, unit[None], np.array([far_m]), now_us)
 
     def room(self, points: Floats, pos_ned: Vector, now_us: int) -> tuple[Floats, NDArray[np.bool_]]:
         """How far the nearest solid cell's middle is from each of some places [m], and where it was seen to be free.
@@ -150,13 +146,11 @@ class LocalMap:
         """
         self._follow(pos_ned)
         then = now_us - _HOLD_US
-        solid = (self._solid_us > then) & (self._solid_us >= self._free_us)
-        near = np.full((CELLS, CELLS), ROOM_M)
-        reach = int(ROOM_M / CELL_M)
-        for i in range(-reach, reach + 1):
-            for j in range(-reach, reach + 1):
-                if hypot(i, j) * CELL_M < ROOM_M:
-                    near = np.minimum(near, np.where(np.roll(solid, (i, j), (0, 1)), hypot(i, j) * CELL_M, ROOM_M))
+        is_open = (self._solid_us <= then) | (self._solid_us < self._free_us)
+        first = [-(line % CELLS) for line in self._corner]  # to where its sides do not meet
+        unrolled = np.roll(is_open, first, (0, 1)).astype(np.uint8)
+        near = CELL_M * cv2.distanceTransform(unrolled, cv2.DIST_L2, cv2.DIST_MASK_PRECISE).astype(np.float64)
+        near = np.roll(np.minimum(near, ROOM_M), [-by for by in first], (0, 1))
         rows, columns = self._cells(points.reshape(-1, 2))
         shape = points.shape[:-1]
         is_seen = (self._free_us > then)[rows, columns]
@@ -179,12 +173,6 @@ class LocalMap:
         sectors = np.round((np.arctan2(off[:, 1], off[:, 0]) - yaw_rad) / sector_rad).astype(np.int64) % SECTORS
         np.minimum.at(out, sectors, np.maximum(far_m - 0.5 * CELL_M, 0.0))
         return out
-
-    def _length_m(self, is_open: NDArray[np.bool_]) -> Floats:
-        """How far each direction is open at all its probes [m]."""
-        whole = np.all(is_open.reshape(self._probes.shape[:-1]), axis=-1)
-        first = np.where(np.all(whole, axis=1), whole.shape[1], np.argmin(whole, axis=1))
-        return np.asarray(first * CELL_M)
 
     def _cells(self, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         cells = np.floor(points / CELL_M).astype(np.int64)

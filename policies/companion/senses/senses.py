@@ -99,6 +99,8 @@ class Senses:
             self.bearing_rad = atan2(place[1] - pose.pos_ned[1], place[0] - pose.pos_ned[0])
             self.seen.see(place, pose, has_depth=seen.has_depth)
         self.map.see(image.pixels, pose, self._owner_then(image.time_us, own), own.boot_us)
+        if seen is not None and not self.map.has_depth:
+            self.map.sight(pose, place, own.boot_us)
 
     def _check(self, own: Own, owner: Owner) -> None:
         """Asks a new report whether the owner is whom it takes for them."""
@@ -140,16 +142,14 @@ class Senses:
             return None
         return track.pos_ned + max(own.boot_us - track.time_us, 0) * 1e-6 * track.vel_ned, track.vel_ned
 
-    def _owner_then(self, time_us: int, own: Own) -> Vector | None:
-        """Where the owner was when an image was taken; None: nobody knows."""
+    def _owner_then(self, time_us: int, own: Own) -> tuple[Floats, Floats] | None:
+        """Where the owner was when an image was taken, and how fast; None: nobody knows."""
         if self.silence_s(own) < _GONE_S:
-            place, _ = self.seen.now(time_us)
-            return float(place[0]), float(place[1]), float(place[2])
+            return self.seen.now(time_us)
         track = self.watch.track
         if track is None or self.silence_s(own) >= PHONE_OLD_S:
             return None
-        north, east, down = track.pos_ned + (time_us - track.time_us) * 1e-6 * track.vel_ned
-        return float(north), float(east), float(down)
+        return track.pos_ned + (time_us - track.time_us) * 1e-6 * track.vel_ned, track.vel_ned
 
     def _owner_among(self, found: list[Detection], pose: Pose) -> Detection | None:
         """Who of them is the owner: the one nearest to where they are expected, if any is near enough."""

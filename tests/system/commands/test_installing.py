@@ -15,6 +15,7 @@ PIP = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
 # Where what an extra brings is imported, when its commands are run.
 OF_EXTRAS = (
     *("policies.", "mission.view.", "mission.train.", "mission.follow.", "mission.park.park_session"),
+    "mission.benchmark.",
     *("sim.engines.bullet", "sim.engines.jsbsim_", "sim.engines.quiet_"),
     *("autopilot.tuning", "autopilot.control.margins", "autopilot.estimator.derive"),
     *("autopilot.vehicles.multirotor.tuning", "autopilot.vehicles.rover.tuning"),
@@ -61,7 +62,8 @@ def test_a_bare_environment_flies_and_imports_all_but_what_extras_bring(tmp_path
     refused = run(python.with_name("honeyguide"), "fly", "--engine", "pybullet")
     assert refused.returncode == 2, refused.stderr
     assert "the extra 'engines'" in refused.stderr
-    for needs_extra in (("companion", "--policy", "scripted"), ("train", "Parking1"), ("play", "Parking1")):
+    benchmark = ("benchmark", "park", "--policy", "parking1")
+    for needs_extra in (("companion", "--policy", "scripted"), ("train", "Parking1"), ("play", "Parking1"), benchmark):
         refused = run(python.with_name("honeyguide"), *needs_extra)
         assert refused.returncode == 2, refused.stderr
         assert "the extra 'learn'" in refused.stderr

@@ -91,8 +91,9 @@ def test_an_owner_who_runs_is_no_obstacle_in_late_images(scene: tuple[Guard, Own
         pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 212, np.uint8)  # all else is 20 m away
         pixels[:, 30:34, 3] = int(255.0 * far_m / (far_m + float(DEPTH_HALF_M)))  # their body
         guard.senses.sense(own, Owner(), ImageFrame(taken_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M)))
-    known_m = guard.senses.map.clear_m(own.pos_ned, own.boot_us)[1]
-    assert known_m[0] > 9.0  # to the north, where they run
+    north = np.stack([np.arange(0.5, 9.0, 0.25), np.zeros(34)], -1)  # where they run
+    room_m, _ = guard.senses.map.room(north, own.pos_ned, own.boot_us)
+    assert (room_m > 0.5).all()
 
 
 @pytest.mark.parametrize("wanted_down", [-2.0, 2.0])

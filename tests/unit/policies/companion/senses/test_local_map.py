@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from common.attitude import Vector
 from policies.companion.senses.local_map import CELL_M, LocalMap
 from policies.companion.senses.poses import Pose
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, IMAGE_SIZE
@@ -10,7 +11,7 @@ from policies.tasks.follow_me.observe import DEPTH_HALF_M, IMAGE_SIZE
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 HERE = (3.0, -2.0, -1.6)
 POSE = Pose(0, HERE, LEVEL)
-NORTH, EAST, SOUTH = 0, 9, 18  # indices of directions
+NORTH, SOUTH = (1.0, 0.0), (-1.0, 0.0)
 
 
 def picture(depth_m: float | None) -> np.ndarray:
@@ -21,45 +22,72 @@ def picture(depth_m: float | None) -> np.ndarray:
     return pixels
 
 
+def way_m(seen: LocalMap, pos_ned: Vector, way: tuple[float, float], now_us: int = 0) -> tuple[float, float]:
+    """How far it was seen to be free from a place in a direction, and how far nothing solid is nearer than 0.3 m."""
+    along_m = np.arange(0.0, 9.5, 0.5 * CELL_M)
+    room_m, is_seen = seen.room(np.array(pos_ned[:2]) + along_m[:, None] * np.array(way), pos_ned, now_us)
+    is_clear = room_m > 0.3
+    free_m, known_m = (
+        float(along_m[max(int(np.argmin([*ok, False])) - 1, 0)]) for ok in (is_seen & is_clear, is_clear)
+    )
+    return free_m, known_m
+
+
 def test_before_the_first_picture_nothing_is_free_and_nothing_solid() -> None:
-    free_m, known_m = LocalMap().clear_m(HERE, 0)
-    assert (free_m == 0.0).all()
-    assert (known_m > 9.0).all()
+    free_m, known_m = way_m(LocalMap(), HERE, NORTH)
+    assert free_m <= 0.0
+    assert known_m > 9.0
 
 
 @pytest.mark.parametrize("wall_m", [2.0, 5.0])
 def test_a_wall_ahead_ends_the_way_ahead_and_none_behind_is_known(wall_m: float) -> None:
     seen = LocalMap()
     seen.see(picture(wall_m), POSE, None, 0)
-    free_m, known_m = seen.clear_m(HERE, 0)
-    assert free_m[NORTH] == pytest.approx(wall_m, abs=2.5 * CELL_M)
-    assert known_m[NORTH] == pytest.approx(wall_m, abs=2.5 * CELL_M)
-    assert free_m[SOUTH] <= 1.0
-    assert known_m[SOUTH] > 9.0
+    free_m, known_m = way_m(seen, HERE, NORTH)
+    assert free_m == pytest.approx(wall_m, abs=2.5 * CELL_M)
+    assert known_m == pytest.approx(wall_m, abs=2.5 * CELL_M)
+    free_m, known_m = way_m(seen, HERE, SOUTH)
+    assert free_m <= 1.0
+    assert known_m > 9.0
 
 
-def test_the_owner_is_no_wall() -> None:
+def test_the_owner_is_no_wall_and_what_they_hide_is_not_free() -> None:
     seen = LocalMap()
-    owner_ned = (HERE[0] + 2.0, HERE[1], HERE[2])
-    seen.see(picture(2.0), POSE, owner_ned, 0)
-    assert seen.clear_m(HERE, 0)[0][NORTH] > 6.0
+    owner = np.add(HERE, (2.0, 0.0, 0.0)), np.zeros(2)
+    seen.see(picture(2.0), POSE, owner, 0)
+    free_m, known_m = way_m(seen, HERE, NORTH)
+    assert free_m == pytest.approx(2.0, abs=2.5 * CELL_M)
+    assert known_m > 6.0
 
 
-def test_without_returns_there_is_no_depth() -> None:
+def test_where_the_owner_runs_is_free_but_for_what_was_seen_to_be_solid() -> None:
+    seen, runs = LocalMap(), np.array([4.0, 0.0])
+    seen.see(picture(2.0), POSE, (np.add(HERE, (2.0, 0.0, 0.0)), runs), 0)
+    assert way_m(seen, HERE, NORTH)[0] == pytest.approx(6.0, abs=2.5 * CELL_M)
+    seen = LocalMap()
+    seen.see(picture(4.0), POSE, None, 0)
+    seen.see(picture(2.0), POSE, (np.add(HERE, (2.0, 0.0, 0.0)), runs), 100_000)
+    assert way_m(seen, HERE, NORTH)[1] == pytest.approx(4.0, abs=2.5 * CELL_M)
+
+
+def test_without_returns_there_is_no_depth_and_only_the_line_to_whom_it_sees_is_free() -> None:
     seen = LocalMap()
     seen.see(picture(None), POSE, None, 0)
     assert not seen.has_depth
-    assert (seen.clear_m(HERE, 0)[0] == 0.0).all()
+    assert way_m(seen, HERE, NORTH)[0] <= 0.0
+    seen.sight(POSE, np.add(HERE, (4.0, 0.0, 0.0)), 0)
+    assert way_m(seen, HERE, NORTH)[0] == pytest.approx(4.0, abs=2 * CELL_M)
+    assert way_m(seen, HERE, SOUTH)[0] <= 1.0
 
 
 def test_what_was_seen_is_remembered_on_the_way_and_forgotten_in_time() -> None:
     seen = LocalMap()
     seen.see(picture(5.0), POSE, None, 0)
     on_the_way = (HERE[0] + 2.0, *HERE[1:])
-    assert seen.clear_m(on_the_way, 1_000_000)[0][NORTH] == pytest.approx(3.0, abs=2.5 * CELL_M)
-    assert (seen.clear_m(on_the_way, 60_000_000)[0] == 0.0).all()
+    assert way_m(seen, on_the_way, NORTH, 1_000_000)[0] == pytest.approx(3.0, abs=2.5 * CELL_M)
+    assert way_m(seen, on_the_way, NORTH, 60_000_000)[0] <= 0.0
     far_away = (HERE[0] + 200.0, *HERE[1:])
-    assert (seen.clear_m(far_away, 1_000_000)[0] == 0.0).all()
+    assert way_m(seen, far_away, NORTH, 1_000_000)[0] <= 0.0
 
 
 def test_a_trunk_beside_the_vehicle_stays_on_the_map() -> None:
@@ -67,7 +95,7 @@ def test_a_trunk_beside_the_vehicle_stays_on_the_map() -> None:
     seen.see(picture(2.0), POSE, None, 0)
     beside = (HERE[0] + 1.5, *HERE[1:])  # half a metre before it
     seen.see(picture(9.0), Pose(100_000, beside, (0.0, 0.0, 1.0, 0.0)), None, 100_000)  # and looks back
-    assert seen.clear_m(beside, 200_000)[1][NORTH] <= 1.0
+    assert way_m(seen, beside, NORTH, 200_000)[1] <= 1.0
 
 
 def test_what_is_solid_is_told_by_sectors_from_the_heading() -> None:

@@ -1,0 +1,75 @@
+"""The velocity that a guard chooses, of maps whose solid cells are known: flown on, it stays clear."""
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from policies.companion.guard.rollouts import Somebody, clear_velocity
+from policies.companion.guard.settings import GuardSettings
+from policies.companion.senses.local_map import CELL_M, LocalMap
+from policies.companion.senses.poses import Pose
+from policies.companion.vehicle_link import Own
+
+S = GuardSettings()
+LEVEL = (0.0, 0.0, 0.0, 1.0)
+SECTOR_RAD = np.pi / 90.0  # as fine as a picture of depth
+BEARINGS = np.arange(180) * SECTOR_RAD
+
+
+def around(trunk: tuple[float, float] | None, pos: np.ndarray) -> LocalMap:
+    """A map of one sweep all round, in which a trunk of 0.2 m may stand."""
+    ranges_m = np.full(180, 12.0)
+    if trunk is not None:
+        off = np.array(trunk) - pos
+        angles = BEARINGS[:, None] + SECTOR_RAD * (np.arange(8) / 8.0 - 0.5)  # rays of each sector
+        along_m = off[0] * np.cos(angles) + off[1] * np.sin(angles)
+        chord_m2 = 0.2**2 - (off @ off - along_m**2)
+        is_met = (along_m > 0.0) & (chord_m2 > 0.0)
+        hit_m = np.where(is_met, along_m - np.sqrt(np.maximum(chord_m2, 0.0)), 12.0)
+        ranges_m = np.minimum(hit_m.min(1), 12.0)
+    seen = LocalMap()
+    seen.sweep(BEARINGS, SECTOR_RAD, ranges_m, 12.0, Pose(0, (*pos, -1.6), LEVEL), 0)
+    return seen
+
+
+def own_at(pos: np.ndarray, vel: np.ndarray) -> Own:
+    return Own(boot_us=0, pos_ned=(*pos, -1.6), vel_ned=(*vel, 0.0))
+
+
+def test_what_is_clear_is_flown_as_wanted() -> None:
+    wanted = np.array([3.0, -2.0])
+    kept = clear_velocity(wanted, wanted, own_at(np.zeros(2), wanted), around(None, np.zeros(2)), S)
+    assert kept == pytest.approx(wanted)
+
+
+def test_where_nothing_has_been_seen_it_creeps() -> None:
+    still = np.zeros(2)
+    kept = clear_velocity(np.array([3.0, 0.0]), still, own_at(still, still), LocalMap(), S)
+    assert 0.3 < float(np.hypot(*kept)) <= S.unseen_speed + 1e-6
+
+
+def test_who_is_pressed_goes_back_to_where_it_has_not_looked() -> None:
+    back, still = np.array([-2.0, 0.0]), np.zeros(2)
+    pressing = Somebody(np.array([1.0, 0.0]), -2.0, is_pressing=True)
+    kept = clear_velocity(back, still, own_at(still, still), LocalMap(), S, pressing)
+    assert kept == pytest.approx(back)
+
+
+@settings(max_examples=25, deadline=None, phases=[Phase.reuse, Phase.generate])  # shrinking would take minutes
+@given(st.floats(1.5, 8.0), st.floats(-1.0, 1.0), st.floats(1.0, 6.0), st.floats(-2.0, 3.0), st.floats(0.0, 6.2))
+def test_who_flies_at_a_trunk_goes_round_it_or_stands_and_never_nearer_to_somebody_than_allowed(
+    ahead: float, aside: float, speed: float, closing_max: float, angle: float
+) -> None:
+    """The vehicle answers a decision later, with a lag, and changes its velocity no faster than it is taken to."""
+    trunk, step_s = (ahead, aside), 0.1
+    person = Somebody(np.array([np.cos(angle), np.sin(angle)]), max(closing_max, speed * float(np.cos(angle))), False)
+    wanted, pos, vel = np.array([speed, 0.0]), np.zeros(2), np.zeros(2)
+    asked, lag_s = [np.zeros(2)], S.reaction_s - step_s
+    for _ in range(60):
+        asked.append(clear_velocity(wanted, asked[-1], own_at(pos, vel), around(trunk, pos), S, person))
+        assert float(asked[-1] @ person.way) <= person.closing_max + 1e-5
+        change = asked.pop(0) - vel
+        vel = vel + change * min(step_s / lag_s, S.brake * step_s / max(float(np.hypot(*change)), 1e-6))
+        pos = pos + step_s * vel
+        assert float(np.hypot(*(pos - trunk))) > 0.2 + S.solid_m - CELL_M
