@@ -60,7 +60,8 @@ class GoalGuard:
 
     def __init__(self, settings: GuardSettings, *, drives: bool) -> None:
         brake = settings.drive_brake if drives else settings.brake
-        self.settings = settings.model_copy(update={"brake": brake, "reaction_s": settings.goal_reaction_s})
+        update = {"brake": brake, "reaction_s": settings.goal_reaction_s, "solid_m": settings.goal_solid_m}
+        self.settings = settings.model_copy(update=update)
         self._drives = drives
         self.stance = GoalStance.FREE
         self.interventions: Counter[str] = Counter()

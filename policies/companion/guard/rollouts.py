@@ -19,7 +19,7 @@ _FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the speed that is wanted
 _TURNS = np.arange(-17, 19) * (np.pi / 18.0)
 _STEP_S, _STEPS = 0.05, 90  # coarser, it would pass over a trunk
 _NEARER_M = 0.1  # who is too near already may come so much nearer on the way out,
-_NEAREST_M = 0.15  # but by no more than this too near
+_NEAREST_M = 0.1  # but by no more than this too near
 _STEADY = 0.3  # how much what was flown last counts beside what is wanted: not left, right and left again
 
 

@@ -41,8 +41,8 @@ class GuardSettings(BaseModel):
     """... and before what does not move."""
     reaction_s: float = Field(default=0.35, ge=0.0)
     """From a setpoint to the motion, besides the age of the picture; measured."""
-    solid_m: float = Field(default=0.5, gt=0.0)
-    """From the vehicle's middle to anything solid."""
+    solid_m: float = Field(default=0.7, gt=0.0)
+    """From the vehicle's middle to that of a solid cell of the map: rotors reach to 0.4 m, half a cell to 0.18 m."""
     unseen_speed: float = Field(default=0.6, ge=0.0)
     """[m/s] to where nothing is known."""
     no_depth_speed: float = Field(default=2.5, ge=0.0)
@@ -65,6 +65,8 @@ class GuardSettings(BaseModel):
     """It stays so far below what the beams that look up see."""
     goal_reaction_s: float = Field(default=0.2, ge=0.0)
     """From a setpoint to the motion of whoever goes to goals, besides the age of the ranges; measured: 0.17 s."""
+    goal_solid_m: float = Field(default=0.5, gt=0.0)
+    """As `solid_m`, of whoever goes to goals, between trees that may stand 1.5 m apart."""
     goal_period_s: float = Field(default=0.1, ge=0.0)
     """So long what is allowed is driven along the nose, until the next scan."""
     drive_brake: float = Field(default=2.5, gt=0.0)

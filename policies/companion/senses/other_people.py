@@ -20,6 +20,7 @@ _APART_M = 0.6  # nearer to somebody, a second one is a part of them
 _FAVOUR_M = 0.25  # so much farther off the owner is still the likelier
 _LATELY_US = 600_000
 _TOGETHER_US = 300_000  # who was there so long before the owner went is not the owner
+_STAYS_US = 500_000
 _OWNER = -1
 
 
@@ -37,7 +38,7 @@ class OtherPeople:
     def __init__(self) -> None:
         self._known: list[_Known] = []
         self.met_us: int | None = None
-        """When somebody was met last."""
+        """When one of them was there last, who was more than a moment's error of the detector."""
 
     def left(self, places: list[Floats], owner: Floats | None, pose: Pose, gone_us: int | None = None) -> list[int]:
         """Indices of the places that are nobody's whom it knows, the owner's among them; the others are taken in.
@@ -66,6 +67,8 @@ class OtherPeople:
         for k, who in taken.items():
             if who != _OWNER:
                 self._known[who].person.see(places[k], pose, has_depth=True)
+                if pose.time_us - self._known[who].met_us > _STAYS_US:
+                    self.met_us = pose.time_us
         return [k for k in range(len(places)) if taken.get(k, _OWNER) == _OWNER]
 
     def forget(self) -> None:
@@ -95,4 +98,3 @@ class OtherPeople:
             one = _Known(SeenOwner(), pose.time_us)
             one.person.see(place, pose, has_depth=True)
             self._known.append(one)
-            self.met_us = pose.time_us
