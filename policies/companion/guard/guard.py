@@ -30,6 +30,10 @@ from policies.companion.vehicle_link import Own
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
 _YAW_MAX = 1.5  # [rad/s]
+_SEARCH_PERIOD_S, _SEARCH_FACES_S = (
+    15.0,
+    4.0,
+)  # while it searches it looks to the phone, the rest of each period round it
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 
 
@@ -69,8 +73,11 @@ class Guard:
 
     def is_lost(self, own: Own) -> bool:
         """Whether the owner was not seen for so long that it is the end; who has just begun may look for them first."""
-        searched_s = max(own.boot_us - self._begun_us, 0) * 1e-6
-        return min(self.senses.silence_s(own), searched_s) > self.settings.lost_s
+        return self._alone_s(own) > self.settings.lost_s
+
+    def _alone_s(self, own: Own) -> float:
+        """Since the owner was seen, or since the policy took over."""
+        return min(self.senses.silence_s(own), max(own.boot_us - self._begun_us, 0) * 1e-6)
 
     def filtered(self, wanted: Velocity, own: Own) -> Velocity:
         """What is flown of a velocity in ned and a yaw rate that a policy asks for."""
@@ -103,7 +110,10 @@ class Guard:
         return Stance.SLOW if silence_s > s.slow_s or age_s > s.image_slow_s else Stance.FREE
 
     def _searched(self, own: Own, is_searching: bool) -> tuple[Floats, float, float]:
-        """Up, out of people's way; towards the phone, no nearer than a stand-off; without one a turn on the spot."""
+        """Up, out of people's way; towards the phone, no nearer than a stand-off; without one it turns on the spot.
+
+        With one too now and then: the phone may be wrong.
+        """
         s = self.settings
         down = -CLIMB_M_S * float(np.clip(2.0 * (s.search_height_m - own.range_m), -0.5, 1.0))
         down = down if isfinite(own.range_m) else 0.0
@@ -114,6 +124,8 @@ class Guard:
             yaw_rate = self._facing(atan2(way[1], way[0]), own)
             if not is_searching or far_m < 0.1:
                 return np.zeros(2), down, yaw_rate
+            if (self._alone_s(own) - s.search_s) % _SEARCH_PERIOD_S > _SEARCH_FACES_S:
+                yaw_rate = s.search_yaw_rate
             speed = min(stopping_speed(far_m - s.search_stand_off_m, s.reaction_s, 1.0), s.search_speed)
             return speed * way / far_m, down, yaw_rate
         if is_searching:

@@ -20,7 +20,8 @@ _APART_M = 0.6  # nearer to somebody, a second one is a part of them
 _FAVOUR_M = 0.25  # so much farther off the owner is still the likelier
 _LATELY_US = 600_000
 _TOGETHER_US = 300_000  # who was there so long before the owner went is not the owner
-_STAYS_US = 500_000
+_WALKS_M = 1.0
+_MET_M = 2.5  # nearer to the owner somebody may be taken for them
 _OWNER = -1
 
 
@@ -29,7 +30,8 @@ class _Known:
     """One of them."""
 
     person: SeenOwner
-    met_us: int  # when they were first seen
+    met_us: int  # when they were first seen,
+    first_ned: Floats  # and where [m]
 
 
 class OtherPeople:
@@ -38,7 +40,8 @@ class OtherPeople:
     def __init__(self) -> None:
         self._known: list[_Known] = []
         self.met_us: int | None = None
-        """When one of them was there last, who was more than a moment's error of the detector."""
+        """When one of them came near the owner last, or was there without them, who walked: a trunk that the detector
+        takes for somebody does not."""
 
     def left(self, places: list[Floats], owner: Floats | None, pose: Pose, gone_us: int | None = None) -> list[int]:
         """Indices of the places that are nobody's whom it knows, the owner's among them; the others are taken in.
@@ -66,8 +69,11 @@ class OtherPeople:
                 taken[k] = who
         for k, who in taken.items():
             if who != _OWNER:
-                self._known[who].person.see(places[k], pose, has_depth=True)
-                if pose.time_us - self._known[who].met_us > _STAYS_US:
+                one = self._known[who]
+                one.person.see(places[k], pose, has_depth=True)
+                walked_m = float(np.hypot(*(places[k] - one.first_ned)[:2]))
+                apart_m = 0.0 if owner is None else float(np.hypot(*(places[k] - owner)[:2]))
+                if walked_m > _WALKS_M and apart_m < _MET_M:
                     self.met_us = pose.time_us
         return [k for k in range(len(places)) if taken.get(k, _OWNER) == _OWNER]
 
@@ -82,7 +88,7 @@ class OtherPeople:
     def exchange(self, index: int, owner: SeenOwner, time_us: int) -> SeenOwner:
         """One of those places is the owner, who was taken for the owner is another; the owner."""
         one = self._lately(time_us)[index]
-        self._known[self._known.index(one)] = _Known(owner, time_us)
+        self._known[self._known.index(one)] = _Known(owner, time_us, owner.now(time_us)[0])
         return one.person
 
     def _lately(self, time_us: int) -> list[_Known]:
@@ -95,6 +101,6 @@ class OtherPeople:
             beside = [*known, *([owner] if owner is not None else [])]
             if any(float(np.hypot(*(place - other)[:2])) < _APART_M for other in beside):
                 continue
-            one = _Known(SeenOwner(), pose.time_us)
+            one = _Known(SeenOwner(), pose.time_us, place)
             one.person.see(place, pose, has_depth=True)
             self._known.append(one)

@@ -2,7 +2,7 @@
 
 In: each report, where the owner is seen, where others are. Out: who else it would rather be, or that it is none of
 those who are seen. The phone's slow error is learned from the sights, and how far it goes astray from that; only others
-who are there make it doubt, for a phone alone may be wrong by many metres.
+who came near make it doubt, for a phone alone may be wrong by many metres.
 """
 
 from enum import Enum
@@ -48,7 +48,7 @@ class PhoneCheck:
             phone: [m] where it puts the owner now.
             seen: [m] where the owner is taken to be.
             others: [m] where others are.
-            has_met_others: there were some not long ago.
+            has_met_others: some may have been taken for the owner not long ago; without, nobody is doubted.
         """
         expected = self.owner(phone)
         if expected is None:
@@ -59,7 +59,7 @@ class PhoneCheck:
         best = int(np.argmin(others_m)) if others_m else -1
         astray_m = _STRAYS * max(self._stray2**0.5, _STRAY_M)
         is_another = best >= 0 and off_m > max(_OFF_M, 0.5 * astray_m) and others_m[best] < off_m - _BETTER_M
-        if not is_another and not (off_m > max(_FAR_M, astray_m) and has_met_others):
+        if not has_met_others or not (is_another or off_m > max(_FAR_M, astray_m)):
             self._doubts = 0
             self._stray2 += _STEADY * (off_m * off_m - self._stray2)
             self._off = (1.0 - _LEARNS) * (phone[:2] - expected) + _LEARNS * (phone[:2] - seen[:2])

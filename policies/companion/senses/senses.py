@@ -34,6 +34,7 @@ _GONE_S = 1.0  # after so long without a sight
 _DOUBTED_US = 2_000_000  # for so long at least who turned out to be another was not the owner
 _MET_US = 20_000_000  # so long ago somebody else was there not long ago
 _STRANGE_S = 4.0  # and after so long anybody may be them
+_NEW_US = 1_000_000  # after so long with somebody in sight they are the owner, if nobody was so before
 _IN_A_ROW = 4  # as many images must show them, one beside the other
 _BESIDE_M = 1.0
 
@@ -67,6 +68,7 @@ class Senses:
         self.heard_us: int | None = None
         self.bearing_rad = 0.0
         """In ned, where the owner was seen last."""
+        self._first_us: int | None = None  # when the first image with somebody in it was taken
         self._row: list[Floats] = []  # where who may be the owner was in the last images
         self._others = OtherPeople()
         self._phone = PhoneCheck()
@@ -157,7 +159,7 @@ class Senses:
         is_gone = silence_s > _GONE_S
         expected, gate_m = self._expected(pose.time_us, silence_s)
         places = [ned_of(detection.chest_hfrd, pose) for detection in found]
-        if isfinite(silence_s) and silence_s > _STRANGE_S:
+        if silence_s > _STRANGE_S:  # or nobody was the owner before
             self._others.forget()
         kept = self._others.left(places, None if is_gone else expected, pose, self.seen_us if is_gone else None)
         found, places = [found[k] for k in kept], [places[k] for k in kept]
@@ -185,7 +187,9 @@ class Senses:
         return best if expected is None or off_m[best] <= gate_m else None
 
     def _expected(self, time_us: int, silence_s: float) -> tuple[Floats | None, float]:
-        """Where the owner is expected in an image, and how far off they may be."""
+        """Where the owner is expected in an image, and how far off they may be; who was never seen may be anywhere."""
+        if self._first_us is None:
+            self._first_us = time_us
         gate_m = min(_GATE_M + _GATE_M_S * silence_s, _GATE_MAX_M)
         if silence_s < _GONE_S:
             return self.seen.now(time_us)[0], gate_m
@@ -194,6 +198,8 @@ class Senses:
             return self._phone_ned, max(gate_m if isfinite(silence_s) else 0.0, _PHONE_GATE_M)
         if track is None or not track.is_known:
             return None, gate_m
+        if self.seen_us is None and time_us - self._first_us > _NEW_US:
+            return track.pos_ned, inf
         doubt_m = 2.5 * float(np.sqrt(max(np.trace(track.pos_cov[:2, :2]), 0.0)))
         expected = track.pos_ned + (time_us - track.time_us) * 1e-6 * track.vel_ned
         return expected, max(gate_m, _PHONE_GATE_M, min(doubt_m, 3.0 * _PHONE_GATE_M))
