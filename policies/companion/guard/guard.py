@@ -34,6 +34,7 @@ _SEARCH_PERIOD_S, _SEARCH_FACES_S = (
     15.0,
     4.0,
 )  # while it searches it looks to the phone, the rest of each period round it
+_THERE_M = 2.0  # so near the stand-off it looks round
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 
 
@@ -124,7 +125,8 @@ class Guard:
             yaw_rate = self._facing(atan2(way[1], way[0]), own)
             if not is_searching or far_m < 0.1:
                 return np.zeros(2), down, yaw_rate
-            if (self._alone_s(own) - s.search_s) % _SEARCH_PERIOD_S > _SEARCH_FACES_S:
+            is_there = far_m < s.search_stand_off_m + _THERE_M
+            if is_there and (self._alone_s(own) - s.search_s) % _SEARCH_PERIOD_S > _SEARCH_FACES_S:
                 yaw_rate = s.search_yaw_rate
             speed = min(stopping_speed(far_m - s.search_stand_off_m, s.reaction_s, 1.0), s.search_speed)
             return speed * way / far_m, down, yaw_rate

@@ -17,7 +17,7 @@ class GuardSettings(BaseModel):
     """After so long it searches: towards the phone, if that is heard; otherwise it turns round where it is."""
     lost_s: float = Field(default=60.0, gt=0.0)
     """After so long control goes back, in Hold."""
-    search_speed: float = Field(default=2.0, gt=0.0)
+    search_speed: float = Field(default=4.0, gt=0.0)
     """[m/s] towards the phone."""
     search_stand_off_m: float = Field(default=5.0, gt=0.0)
     """It comes no nearer to where the phone says."""
@@ -41,7 +41,7 @@ class GuardSettings(BaseModel):
     """... and before what does not move."""
     reaction_s: float = Field(default=0.35, ge=0.0)
     """From a setpoint to the motion, besides the age of the picture; measured."""
-    solid_m: float = Field(default=0.7, gt=0.0)
+    solid_m: float = Field(default=0.6, gt=0.0)
     """From the vehicle's middle to that of a solid cell of the map: rotors reach to 0.4 m, half a cell to 0.18 m."""
     unseen_speed: float = Field(default=0.6, ge=0.0)
     """[m/s] to where nothing is known."""

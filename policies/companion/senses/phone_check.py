@@ -61,8 +61,9 @@ class PhoneCheck:
         is_another = best >= 0 and off_m > max(_OFF_M, 0.5 * astray_m) and others_m[best] < off_m - _BETTER_M
         if not has_met_others or not (is_another or off_m > max(_FAR_M, astray_m)):
             self._doubts = 0
-            self._stray2 += _STEADY * (off_m * off_m - self._stray2)
-            self._off = (1.0 - _LEARNS) * (phone[:2] - expected) + _LEARNS * (phone[:2] - seen[:2])
+            if not has_met_others:  # it might learn that of another
+                self._stray2 += _STEADY * (off_m * off_m - self._stray2)
+                self._off = (1.0 - _LEARNS) * (phone[:2] - expected) + _LEARNS * (phone[:2] - seen[:2])
             return Word.AGREES, -1
         self._doubts += 1
         if self._doubts < _REPORTS:
