@@ -22,7 +22,7 @@ SECONDS = 20.0
 TICKS = round(SECONDS / TICK_S)
 START_M = 30.0  # high enough for no ground effect
 PLAIN = WorldConfig(trees_per_ha=0.0, hill_height_m=0.0)
-SUBSTEPS = 4
+SUBSTEPS = 2
 
 
 def target_of(time_s):

@@ -11,8 +11,14 @@ pytest.importorskip("jsbsim")
 flown = cache(mission)
 
 
-@pytest.mark.parametrize("noise", [pytest.param(0.0, marks=pytest.mark.slow), 1.0])
-@pytest.mark.parametrize(("engine", "airframe"), [("pybullet", "x500"), ("jsbsim", "x500"), ("pybullet", "rover")])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize("noise", [pytest.param(0.0, marks=SLOW), 1.0])
+@pytest.mark.parametrize(
+    ("engine", "airframe"),
+    [("jsbsim", "x500"), *(pytest.param("pybullet", name, marks=SLOW) for name in ("x500", "rover"))],
+)
 def test_a_mission_is_the_same_mission(engine, airframe, noise):
     """Never 5 cm or a degree apart, and every mode in the same frame."""
     found = apart(flown("native", airframe, noise), flown(engine, airframe, noise))
