@@ -127,7 +127,7 @@ class FollowOptions(FlightOptions):
     policy: str | None = option(
         None,
         "A policy of FollowMe, or 'scripted'; for a rover of NavigateRover.",
-        shown="the shipped one, or else 'scripted'",
+        shown="the shipped one",
     )
     owner: str = option("walk", "How the owner moves: walk (to 2 m/s) or run (to 5 m/s).")
     seconds: float = option(60.0, "How long to follow; then it lands.", ge=1.0)

@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import Any
 
 TASKS = {
-    "follow": ("mission.follow.benchmark.following", "follow-me"),
+    "follow": ("mission.follow.benchmark.following", "follow-me-tracked"),
     "navigate": ("mission.benchmark.navigating", "navigate"),
     "park": ("mission.benchmark.parking", "drive-park"),
 }

@@ -44,18 +44,17 @@ from mission.view.replay_file import RecordingError, load_recording
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
 from policies.companion.guard.settings import GuardSettings
-from policies.companion.names import SCRIPTED, TASK
+from policies.companion.names import SCRIPTED
 from policies.companion.pilot import PilotError
 from policies.companion.skills.following import Pilot
 from policies.companion.skills.load_skill import load_follower
 from policies.companion.vector_pilot import NavigationPilot
-from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.follow_me.scorecard import Scorecard, lines, named_lines, scorecard
 from sim.bodies.vehicles import class_of
 
 ENGAGE_S = 20.0  # after the take-off, until it follows
 STOP_S = 3.0  # of what drives, until it stands
-ROVER_POLICY = "navigate-rover-follow"
+DRONE_POLICY, ROVER_POLICY = "follow-me-tracked", "navigate-rover-follow"
 FILM = "flight.mp4"
 SHOWN = ("in_band", "in_view", "distance_median_m", "collision")  # figures of the scorecard on the live page
 
@@ -169,8 +168,7 @@ def chosen_pilot(options: FollowOptions) -> tuple[Pilot | NavigationPilot, str]:
         UserError: no such policy, or none for this vehicle.
     """
     drives = class_of(load_airframe(options.airframe)).drives
-    shipped = ROVER_POLICY if drives else TASK if pretrained(TASK) is not None else SCRIPTED
-    name = options.policy or shipped
+    name = options.policy or (ROVER_POLICY if drives else DRONE_POLICY)
     try:
         pilot = load_follower(name)
     except PilotError as error:

@@ -95,7 +95,7 @@ class Guard:
             scale = faded(silence_s, s.slow_s, s.stop_s) * faded(age_s, s.image_slow_s, s.image_stop_s)
             level, down = scale * level, scale * down
             self.interventions[self.stance.value] += 1
-        level, owner = self._past_owner(level, own)
+        level, owner = self._past_owner(level, own, s.reaction_s + age_s)
         level = self._flown = self._past_solids(level, own, owner)
         down = self._within_heights(down, own)
         return (float(level[0]), float(level[1]), float(down)), yaw_rate
@@ -138,7 +138,7 @@ class Guard:
         error = wrapped(bearing_rad - yaw_of(own.q_ned_from_frd))
         return float(np.clip(_FACE_GAIN * error, -_YAW_MAX, _YAW_MAX))
 
-    def _past_owner(self, level: Floats, own: Own) -> tuple[Floats, Somebody | None]:
+    def _past_owner(self, level: Floats, own: Own, delay_s: float) -> tuple[Floats, Somebody | None]:
         """The velocity without what brings it too near to the owner, and what it has to do with them."""
         known, s = self.senses.owner_now(own), self.settings
         self._is_too_near = False
@@ -148,9 +148,9 @@ class Guard:
         vel, own_vel = known[1][:2], np.array(own.vel_ned[:2])
         far_m = float(np.hypot(*way))
         unit = way / max(far_m, 1e-3)
-        then_m = far_m - s.reaction_s * max(float((own_vel - vel) @ unit), 0.0)
+        then_m = far_m - delay_s * max(float((own_vel - vel) @ unit), 0.0)
         self._is_too_near = then_m < s.owner_m
-        owner = Somebody(unit, closing_max(way, own_vel, vel, s.reaction_s, s), then_m < s.pressed_m)
+        owner = Somebody(unit, closing_max(way, own_vel, vel, delay_s, s), then_m < s.pressed_m)
         kept = kept_off(level, unit, owner.closing_max)
         self._count("near the owner", level, kept)
         return kept, owner
