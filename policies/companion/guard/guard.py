@@ -25,7 +25,7 @@ from policies.companion.guard.rollouts import Somebody, clear_velocity
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
-from policies.companion.vehicle_link import Own
+from policies.companion.vehicle_link import NEVER_US, Own
 
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
@@ -35,6 +35,7 @@ _SEARCH_PERIOD_S, _SEARCH_FACES_S = (
     4.0,
 )  # while it searches it looks to the phone, the rest of each period round it
 _THERE_M = 2.0  # so near the stand-off it looks round
+_RISEN_US = 2_000_000  # for so long it stays over the owner
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 
 
@@ -65,6 +66,7 @@ class Guard:
         self._begun_us = 0  # when the policy took over, on the vehicle's clock
         self._flown = np.zeros(2)  # what was let be flown last
         self._is_too_near = False
+        self._risen_us = NEVER_US  # when it rose over the owner last
 
     def begin(self, own: Own) -> None:
         """The policy takes over."""
@@ -169,7 +171,10 @@ class Guard:
         s = self.settings
         if self._is_too_near and not own.range_m > s.height_max_m:
             self.interventions["over the owner"] += 1
+            self._risen_us = own.boot_us
             return -s.escape_climb
+        if own.boot_us - self._risen_us < _RISEN_US:  # they may be right below, where it cannot see them
+            down = min(down, 0.0)
         return within_heights(down, own.range_m, s)
 
     def _count(self, why: str, wanted: Floats, kept: Floats) -> None:
