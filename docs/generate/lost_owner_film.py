@@ -28,8 +28,8 @@ FILM = Path(__file__).parents[1] / "images" / "lost-owner.webp"
 SEED, SECONDS = 11, 60.0
 EVERY = 5  # images of the film
 BEFORE_S, AFTER_S = 1.5, 3.5  # shown before the guard becomes slower, and after the policy goes on
-SIZE = (480, 270)
-QUALITY = 30
+SIZE = (400, 225)
+QUALITY = 25
 
 
 def main() -> None:
