@@ -42,7 +42,7 @@ class GuardSettings(BaseModel):
     reaction_s: float = Field(default=0.35, ge=0.0)
     """From a setpoint to the motion, besides the age of the picture; measured."""
     solid_m: float = Field(default=0.6, gt=0.0)
-    """From the vehicle's middle to that of a solid cell of the map: rotors reach to 0.4 m, half a cell to 0.18 m."""
+    """From the vehicle's middle to that of a solid cell of the map: it reaches to 0.4 m, half a cell to 0.18 m."""
     unseen_speed: float = Field(default=0.6, ge=0.0)
     """[m/s] to where nothing is known."""
     no_depth_speed: float = Field(default=2.5, ge=0.0)
