@@ -29,6 +29,7 @@ SEED, SECONDS = 11, 60.0
 EVERY = 5  # images of the film
 BEFORE_S, AFTER_S = 1.5, 3.5  # shown before the guard becomes slower, and after the policy goes on
 SIZE = (400, 225)
+STRIP = 27  # [pixels]
 QUALITY = 25
 
 
@@ -67,9 +68,9 @@ def shown(stances: dict[int, Stance]) -> tuple[int, int]:
 
 
 def captioned(image: np.ndarray, stance: Stance) -> Image.Image:
-    """With what the guard does, in the upper left corner."""
-    cv2.putText(image, stance.value, (9, 23), cv2.FONT_HERSHEY_SIMPLEX, 0.55, (0, 0, 0), 3, cv2.LINE_AA)
-    cv2.putText(image, stance.value, (9, 23), cv2.FONT_HERSHEY_SIMPLEX, 0.55, (255, 255, 255), 1, cv2.LINE_AA)
+    """With what the guard does, on a darkened strip along the upper edge."""
+    image[:STRIP] >>= 1
+    cv2.putText(image, stance.value, (9, 19), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
     return Image.fromarray(image)
 
 
