@@ -11,7 +11,7 @@ import numpy as np
 
 from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
-from mission.follow.follow_session import DRONE_POLICY, score_lines, watch_of
+from mission.follow.follow_session import score_lines, watch_of
 from mission.follow.lockstep import flight_with_companion
 from mission.script import take_off
 from mission.view.chase_camera import IMAGE_S
@@ -19,6 +19,7 @@ from mission.view.film_images import film
 from mission.view.live import LiveView
 from mission.view.page import PageServer
 from mission.view.replay_file import keep_for_replay, load_recording
+from policies.companion.names import FOLLOWER
 from policies.companion.skills.load_skill import load_follower
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 from tests.browser import Browser
@@ -32,7 +33,7 @@ QUALITY = (cv2.IMWRITE_JPEG_QUALITY, 88)
 
 
 def main() -> None:
-    pilot = load_follower(DRONE_POLICY)
+    pilot = load_follower(FOLLOWER)
     run = tempfile.TemporaryDirectory()
     config = FlightConfig(world=FOLLOW_WORLD, owner=OwnerConfig(), seed=SEED)
     flight, companion = flight_with_companion(config, pilot, folder=Path(run.name))

@@ -14,13 +14,13 @@ from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
 from mission.follow.benchmark.conditions import BY_NAME
 from mission.follow.follow_scoring import FollowWatch
-from mission.follow.follow_session import DRONE_POLICY
 from mission.follow.lockstep import flight_with_companion, follow_for
 from mission.view.chase_camera import IMAGE_S
 from mission.view.film_images import film
 from mission.view.replay_file import keep_for_replay, load_recording
 from policies.companion.guard.guard import Stance
 from policies.companion.guard.settings import GuardSettings
+from policies.companion.names import FOLLOWER
 from policies.companion.skills.load_skill import load_follower
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
@@ -34,7 +34,7 @@ QUALITY = 25
 
 
 def main() -> None:
-    pilot = load_follower(DRONE_POLICY)
+    pilot = load_follower(FOLLOWER)
     condition = BY_NAME["gone-8"]
     owner = OwnerConfig(pace=condition.pace, numbers=dict(condition.numbers))
     stances: dict[int, Stance] = {}  # by the image of the film

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+from policies.companion.names import FOLLOWER
+
 TASKS = {
-    "follow": ("mission.follow.benchmark.following", "follow-me-tracked"),
+    "follow": ("mission.follow.benchmark.following", FOLLOWER),
     "navigate": ("mission.benchmark.navigating", "navigate"),
     "park": ("mission.benchmark.parking", "drive-park"),
 }

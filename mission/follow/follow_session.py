@@ -44,7 +44,7 @@ from mission.view.replay_file import RecordingError, load_recording
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
 from policies.companion.guard.settings import GuardSettings
-from policies.companion.names import SCRIPTED
+from policies.companion.names import FOLLOWER, SCRIPTED
 from policies.companion.pilot import PilotError
 from policies.companion.skills.following import Pilot
 from policies.companion.skills.load_skill import load_follower
@@ -54,7 +54,7 @@ from sim.bodies.vehicles import class_of
 
 ENGAGE_S = 20.0  # after the take-off, until it follows
 STOP_S = 3.0  # of what drives, until it stands
-DRONE_POLICY, ROVER_POLICY = "follow-me-tracked", "navigate-rover-follow"
+ROVER_POLICY = "navigate-rover-follow"
 FILM = "flight.mp4"
 SHOWN = ("in_band", "in_view", "distance_median_m", "collision")  # figures of the scorecard on the live page
 
@@ -168,7 +168,7 @@ def chosen_pilot(options: FollowOptions) -> tuple[Pilot | NavigationPilot, str]:
         UserError: no such policy, or none for this vehicle.
     """
     drives = class_of(load_airframe(options.airframe)).drives
-    name = options.policy or (ROVER_POLICY if drives else DRONE_POLICY)
+    name = options.policy or (ROVER_POLICY if drives else FOLLOWER)
     try:
         pilot = load_follower(name)
     except PilotError as error:

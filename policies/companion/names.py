@@ -2,3 +2,5 @@
 
 SCRIPTED = "scripted"
 TASK = "FollowMe"
+FOLLOWER = "follow-me-tracked"
+"""The policy by which a drone follows unless another is named."""

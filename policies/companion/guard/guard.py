@@ -30,10 +30,8 @@ from policies.companion.vehicle_link import NEVER_US, Own
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
 _YAW_MAX = 1.5  # [rad/s]
-_SEARCH_PERIOD_S, _SEARCH_FACES_S = (
-    15.0,
-    4.0,
-)  # while it searches it looks to the phone, the rest of each period round it
+_SEARCH_PERIOD_S = 15.0  # of a search towards the phone: at first it looks there,
+_SEARCH_FACES_S = 4.0  # and then round it
 _THERE_M = 2.0  # so near the stand-off it looks round
 _RISEN_US = 2_000_000  # for so long it stays over the owner
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
@@ -73,6 +71,7 @@ class Guard:
         self.stance = Stance.FREE
         self._begun_us = own.boot_us
         self._flown = np.array(own.vel_ned[:2])
+        self._risen_us = NEVER_US
 
     def is_lost(self, own: Own) -> bool:
         """Whether the owner was not seen for so long that it is the end; who has just begun may look for them first."""
