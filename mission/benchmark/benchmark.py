@@ -9,10 +9,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from policies.companion.names import FOLLOWER
-
 TASKS = {
-    "follow": ("mission.follow.benchmark.following", FOLLOWER),
+    "follow": ("mission.follow.benchmark.following", "follow-me-tracked"),
     "navigate": ("mission.benchmark.navigating", "navigate"),
     "park": ("mission.benchmark.parking", "drive-park"),
 }
