@@ -37,7 +37,16 @@ from policies.tasks.parking.parking_params import (
     reward_defaults,
 )
 from policies.tasks.parking.scene import Scene, contact_of, half_of_pad
-from policies.tasks.parking.settings import AS_DOCUMENTED, PROGRESS, Choices, ParkingSettings, Rules, chosen, rules_of
+from policies.tasks.parking.settings import (
+    AS_DOCUMENTED,
+    PROGRESS,
+    Choices,
+    Parking1Settings,
+    ParkingSettings,
+    Rules,
+    chosen,
+    rules_of,
+)
 from policies.tasks.parking.spots import cells, draw_block, draw_goal, draw_start
 from policies.tasks.parking.world import CarState, ParkingTask, keep_motion, motion_of
 from policies.tasks.task_params import Sampler, typed_rows
@@ -47,6 +56,7 @@ wp.set_module_options({"enable_backward": False})
 _AS_DOCUMENTED, _PROGRESS = wp.constant(AS_DOCUMENTED), wp.constant(PROGRESS)
 _SPOT_HEIGHT, _BLOCK_HEIGHT = wp.constant(SPOT_HEIGHT), wp.constant(BLOCK_HEIGHT)
 _GOAL_STREAM, _START_STREAM, _YAW_STREAM, _BLOCK_STREAM = (wp.constant(stream) for stream in (1, 2, 3, 4))
+_SIDE_STREAM = wp.constant(4 + len(BLOCK_POSITIONS))  # blocks have one each
 
 PRESETS = {
     "as-documented": Choices(
@@ -132,6 +142,15 @@ def scene_of(cars: CarState, blocks: Blocks, i: int) -> Scene:
 
 
 @wp.func
+def side_of(rules: Rules, seed: int, i: int, episode: int) -> float:
+    """What the published x are multiplied by: -1 where they are mirrored."""
+    if not rules.is_mirrored:
+        return 1.0
+    rng = draw_key(seed, i, wp.where(rules.is_reset_coded, 0, episode), _SIDE_STREAM)
+    return wp.where(wp.randf(rng) < 0.5, -1.0, 1.0)
+
+
+@wp.func
 def way_left(motion: Motion, scene: Scene, rules: Rules, params: CarParams) -> float:
     """From the car's box to the pad [m]."""
     box = box_of_car(motion.pose, params.box_ahead_m)
@@ -156,8 +175,10 @@ def place_blocks(
         for k in range(BLOCK_COUNT):
             blocks.poses[i, k] = others.obstacles[k]
     else:
+        side = side_of(rules, buffers.seed[i], i, episode)
         for k in range(BLOCK_COUNT):
-            blocks.poses[i, k] = positions.blocks[k]
+            block = positions.blocks[k]
+            blocks.poses[i, k] = wp.vec4(side * block[0], block[1], side * block[2], block[3])
 
 
 @wp.func
@@ -172,6 +193,7 @@ def place_goal(
 ) -> None:
     """A new goal."""
     scene = scene_of(cars, blocks, i)
+    side = side_of(rules, buffers.seed[i], i, episode)
     position = wp.vec2()
     if rules.are_goals_anywhere:
         position = draw_goal(positions.cells, scene, buffers.seed[i], i, episode, _GOAL_STREAM)
@@ -179,8 +201,9 @@ def place_goal(
         position = positions.marker
     else:
         rng = draw_key(buffers.seed[i], i, episode, _GOAL_STREAM)
-        position = positions.spots[wp.randi(rng, 0, positions.spots.shape[0])]
-    cars.goal[i] = pose_at(position, wp.radians(cars.params[i].goal_yaw_deg))
+        spot = positions.spots[wp.randi(rng, 0, positions.spots.shape[0])]
+        position = wp.vec2(side * spot[0], spot[1])
+    cars.goal[i] = pose_at(position, side * wp.radians(cars.params[i].goal_yaw_deg))
 
 
 @wp.func
@@ -200,8 +223,9 @@ def place_car(
         rng = draw_key(buffers.seed[i], i, episode, _YAW_STREAM)
         cars.yaw[i] = wp.pi * (2.0 * wp.randf(rng) - 1.0)
     else:
-        cars.pos[i] = position_of(positions.start)
-        cars.yaw[i] = positions.start_yaw
+        side = side_of(rules, buffers.seed[i], i, episode)
+        cars.pos[i] = wp.vec2(side * positions.start[0], positions.start[1])
+        cars.yaw[i] = side * positions.start_yaw
 
 
 @wp.func
@@ -281,11 +305,12 @@ class Parking1(ParkingTask):
     """The task. Layout version 1."""
 
     params: ClassVar = (*CAR_PARAMS, *LEVEL1_PARAMS)
-    settings_class: ClassVar = ParkingSettings
+    settings_class: ClassVar = Parking1Settings
 
-    def __init__(self, settings: ParkingSettings, env_count: int, device: str = "cpu") -> None:
+    def __init__(self, settings: Parking1Settings, env_count: int, device: str = "cpu") -> None:
         choices = chosen(settings, PRESETS[settings.preset])
         rules = rules_of(choices, settings.ray_tags)
+        rules.is_mirrored = settings.mirrored
         tags = tuple(settings.ray_tags.split("+")) if settings.ray_tags else ()
         self.decision_s = choices.decision_period * TICK_S
         layout = Layout(

@@ -87,6 +87,14 @@ class ParkingSettings(TaskSettings):
         return tags
 
 
+class Parking1Settings(ParkingSettings):
+    """Level 1 has two sides that are alike."""
+
+    mirrored: bool = False
+    """Whether published start, spots and blocks are mirrored, left to right, in one episode of two; with
+    `resets=as-coded` in one environment of two."""
+
+
 class Parking2Settings(ParkingSettings):
     """Level 2 adds a storey."""
 
@@ -141,6 +149,7 @@ class Rules:
     needs_pose: wp.bool
     is_held: wp.bool
     is_reset_coded: wp.bool
+    is_mirrored: wp.bool  # every other episode; level 1 only
     tick_count: int  # physics steps per decision
     ray_count: int  # to each side; -1: none
     tag_count: int

@@ -284,3 +284,32 @@ def test_pictures_show_every_preset():
         image = built(preset=preset, rays=4).top_view(0, 240)
         assert image.shape[0] == 240
         assert len(np.unique(image.reshape(-1, 3), axis=0)) > 5
+
+
+def test_every_other_episode_is_the_published_world_mirrored():
+    task = built(512, preset="as-documented", mirrored=True)
+    side = np.sign(task.world.pos.numpy()[:, 0]) / np.sign(LEVEL1_START[0])
+    assert 0.4 < (side < 0.0).mean() < 0.6
+    goals, blocks = task.world.goal.numpy(), task.blocks.numpy()
+    flip = np.stack([side, np.ones(512), side, np.ones(512)], axis=1)
+    plain = {tuple(np.round(goal, 4)) for goal in built(512, preset="as-documented").world.goal.numpy().tolist()}
+    assert {tuple(np.round(goal, 4)) for goal in (goals * flip).tolist()} == plain
+    assert np.allclose(blocks * flip[:, None], [pose(block) for block in BLOCK_POSITIONS], atol=1e-5)
+
+
+def test_what_is_done_the_other_way_round_in_a_mirrored_episode_pays_the_same():
+    task = built(64, preset="as-documented", reward="progress", goals="one", mirrored=True)
+    side = np.sign(task.world.pos.numpy()[:, 0]) / np.sign(LEVEL1_START[0])
+    assert len(set(side.tolist())) == 2
+    rewards = np.array([act(task, *[RIGHT if s > 0 else LEFT for s in side]) for _ in range(10)])
+    assert np.allclose(rewards, rewards[:, :1], atol=1e-5)
+    assert np.abs(rewards[:, 0]).min() > 1e-3
+
+
+def test_coded_resets_keep_the_side_of_an_environment():
+    task = built(64, preset="as-coded", mirrored=True)
+    side = np.sign(task.blocks.numpy()[:, 0, 0])
+    assert len(set(side.tolist())) == 2
+    for _ in range(100):
+        act(task, *[[PUSH]] * 64)
+        assert (np.sign(task.blocks.numpy()[:, 0, 0]) == side).all()
