@@ -105,8 +105,9 @@ def run(experiment: Experiment, seed: int, kept: Path | None) -> Result:
         config = configured(experiment, seed, folder)
         task = config.env_settings.env_path or ""
         _compile(task, config)
-        if config.behavior.reward_signals.gail is not None:
-            config = changed(config, {"behavior.reward_signals.gail.demo_path": str(_demonstrated(config, folder))})
+        if imitates := _imitating(config):
+            recorded = str(_demonstrated(config, folder))
+            config = changed(config, {f"{block}.demo_path": recorded for block in imitates})
         curve = Curve(config.behavior.max_steps)
         result = train(config, curve)
         train_s = curve.elapsed_s
@@ -148,6 +149,13 @@ def run(experiment: Experiment, seed: int, kept: Path | None) -> Result:
         evaluations,
         clock="processor",
     )
+
+
+def _imitating(config: RunConfig) -> list[str]:
+    """The blocks that name demonstrations."""
+    behavior = config.behavior
+    blocks = {"reward_signals.gail": behavior.reward_signals.gail, "behavioral_cloning": behavior.behavioral_cloning}
+    return [f"behavior.{path}" for path, block in blocks.items() if block is not None]
 
 
 def _demonstrated(config: RunConfig, folder: str) -> Path:
