@@ -102,8 +102,8 @@ class GoalGuard:
         layout = ranges.layout
         had_none = self._had_none
         self._had_none = ranges.ranges_m[: layout.sectors] >= layout.range_m
-        is_told = ~self._had_none | (had_none if len(had_none) else True)  # one in a hundred misses what is there
-        bearings, sector_m = sectors_of(ranges, is_told)
+        is_reported = ~self._had_none | (had_none if len(had_none) else True)  # one in a hundred misses what is there
+        bearings, sector_m = sectors_of(ranges, is_reported)
         self._map.sweep(bearings, radians(layout.sector_deg), sector_m, layout.range_m, pose, now_us)
         beams_m = ranges.ranges_m[layout.sectors :]
         up = [(far_m, elevation) for far_m, elevation in zip(beams_m, layout.beam_elevations_deg, strict=True)]
@@ -228,5 +228,5 @@ def sectors_of(ranges: Ranges, is_chosen: NDArray[np.bool_] | bool = True) -> tu
     """Bearings of the sectors' middles from the nose [rad] and their ranges [m], of those that told something."""
     layout = ranges.layout
     bearings = np.radians(layout.first_edge_deg + layout.sector_deg * (np.arange(layout.sectors) + 0.5))
-    is_told = ranges.is_known & is_chosen
-    return bearings[is_told], ranges.ranges_m[: layout.sectors][is_told].astype(np.float64)
+    is_reported = ranges.is_known & is_chosen
+    return bearings[is_reported], ranges.ranges_m[: layout.sectors][is_reported].astype(np.float64)

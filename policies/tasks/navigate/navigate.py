@@ -157,8 +157,8 @@ class Navigate(FlightTask):
         commands = wp.zeros(self.env_count, dtype=Command, device=self.device)  # of the running decision
         self._act = record(act, buffers, rules, rig, state, commands)
         self._command = record(command, rig, commands)
-        told = (rules.has_estimator, state.attitude_errors)
-        self._scan = record(scan, rig, state.params, state.is_all, *told, 0, state.scans_m, state.ranges_m)
+        reported = (rules.has_estimator, state.attitude_errors)
+        self._scan = record(scan, rig, state.params, state.is_all, *reported, 0, state.scans_m, state.ranges_m)
         self._judge = record(judge, buffers, rules, rig, state, start)
         self._prepare = record(prepare, buffers, state, start)
         self._place = record(place, buffers, rig, wp.clone(self.rig.models[:1]), state, start)

@@ -21,7 +21,7 @@ from policies.tasks.flight.own_state import Command, action_command
 from policies.tasks.navigate.navigate_params import NavigateParams
 from policies.tasks.navigate.observe import write_frame
 from policies.tasks.navigate.reward import navigate_outcome, navigate_reward
-from policies.tasks.navigate.vehicles import attitude_error, goal_shown, own, told_estimate, touches, vary
+from policies.tasks.navigate.vehicles import attitude_error, goal_shown, own, reported_estimate, touches, vary
 from policies.tasks.navigate.walking_goal import follow_speed, walk_vel
 from sim.truth import Truth
 from sim.world.world import World, ground_height, obstacle_contact
@@ -75,7 +75,7 @@ def goal_vel(buffers: StepBuffers, rules: Rules, state: NavigateState, i: int) -
 @wp.kernel(enable_backward=False)
 def act(buffers: StepBuffers, rules: Rules, rig: Any, state: NavigateState, commands: wp.array(dtype=Command)) -> None:
     i = wp.tid()
-    estimate = told_estimate(rig, i, rules.has_estimator, state.attitude_errors)
+    estimate = reported_estimate(rig, i, rules.has_estimator, state.attitude_errors)
     asked = action_command(continuous_action(buffers, i), estimate.q_ned_from_frd)
     kept_m = state.params[i].kept_m
     if kept_m > 0.0:

@@ -11,7 +11,7 @@ import warp as wp
 from common.range_sectors import RANGES
 from common.rng import draw_tick
 from policies.tasks.navigate.navigate_params import NavigateParams
-from policies.tasks.navigate.vehicles import told_estimate
+from policies.tasks.navigate.vehicles import reported_estimate
 from sim.sensors.scanner import ned_from_levelled, scan_ranges
 
 wp.set_module_options({"enable_backward": False})
@@ -50,7 +50,7 @@ def scan(
         return
     truth = rig.truth[i]
     level = ned_from_levelled(
-        truth.q_ned_from_frd, told_estimate(rig, i, has_estimator, attitude_errors).q_ned_from_frd
+        truth.q_ned_from_frd, reported_estimate(rig, i, has_estimator, attitude_errors).q_ned_from_frd
     )
     world = rig.worlds[rig.i_world[i]]
     tick = draw_tick(rig.tick[i])

@@ -57,7 +57,7 @@ def attitude_error(error_deg: float, seed: int, i: int, episode: int) -> wp.quat
 
 
 @wp.func
-def told_estimate(rig: Any, i: int, has_estimator: int, attitude_errors: wp.array(dtype=wp.quat)) -> Estimate:
+def reported_estimate(rig: Any, i: int, has_estimator: int, attitude_errors: wp.array(dtype=wp.quat)) -> Estimate:
     """The state as the vehicle tells it, its attitude off by the error of the episode."""
     estimate = vehicle_estimate(rig, i, has_estimator)
     estimate.q_ned_from_frd = attitude_errors[i] * estimate.q_ned_from_frd
