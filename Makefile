@@ -42,10 +42,9 @@ reproduce-cars: $(STAMP) ## Train every row of docs/results/cars.md from scratch
 reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow.md (hours); flags: ARGS="student"
 	@$(BIN)/python -m bench.follow $(ARGS)
 
-reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in two legs, and judge it (half an hour)
-	@$(BIN)/honeyguide train navigate --run-id navigate --force
-	@$(BIN)/honeyguide train navigate-careful --force
-	@$(BIN)/python -m bench.navigate results/navigate-careful/Navigate.pt
+reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in three legs of three seeds, choose and judge it (two hours); only choose: ARGS="judge"
+	@$(BIN)/python -m bench.navigate_training $(ARGS)
+	@$(BIN)/python -m bench.navigate results/navigate-chosen.pt
 
 reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policy from nothing, and judge it (a quarter of an hour)
 	@$(BIN)/honeyguide train navigate-rover --run-id navigate-rover --force

@@ -88,13 +88,20 @@ class Flights:
         return bootstrap(len(speeds), lambda rows: float(speeds[rows].mean()) if len(rows) else float("nan"))
 
 
-def build(settings: dict[str, str], trees_per_ha: float, episodes: int, name: str = "Navigate") -> Navigate:
+def build(
+    settings: dict[str, str],
+    trees_per_ha: float,
+    episodes: int,
+    name: str = "Navigate",
+    seed: int = SEED,
+    scan_lag_s: float = 0.0,
+) -> Navigate:
     """Held-out environments of one density."""
     task = build_task(name, episodes, task_settings(name, settings | {"split": "test"}))
     if not isinstance(task, Navigate):
         raise TypeError(task)
-    task.set_params({"trees_per_ha": trees_per_ha})
-    task.reset(SEED)
+    task.set_params({"trees_per_ha": trees_per_ha, "scan_lag_s": scan_lag_s})
+    task.reset(seed)
     return task
 
 

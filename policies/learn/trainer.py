@@ -144,6 +144,7 @@ class Training:
         self._elapsed_before_s = 0.0
         self._events_position: dict[str, Any] | None = None
         self._saved: list[dict[str, Any]] = []
+        self._parents: list[dict[str, Any]] = []
         fraction = self.behavior.success_target
         self._target = SuccessTarget(fraction, self.task_name, self.task_settings) if fraction is not None else None
         self._judged: Evaluation | None = None
@@ -290,7 +291,7 @@ class Training:
             figures |= {"success_rate": self._judged.success_rate, "success_low": low, "success_high": high}
         settings = self.task_settings.model_dump()
         params = {name: asdict(sampler) for name, sampler in self.curriculum.final_params().items()}
-        return PolicyCard(self.task_name, settings, self.seed, self.learner.steps, figures, params)
+        return PolicyCard(self.task_name, settings, self.seed, self.learner.steps, figures, params, self._parents)
 
     def _progress(self) -> Progress:
         now_s = wall_time_s()
@@ -323,6 +324,7 @@ class Training:
         self._events_position = content["events"]
         self._elapsed_before_s = content["elapsed_s"]
         self._saved = content["saved"]
+        self._parents = content["card"].get("parents", [])  # not in checkpoints of before there were
         if "best" in content:  # not in checkpoints of before there was one
             self._best.load_state(content["best"])
 
@@ -334,6 +336,7 @@ class Training:
         require_fit(_network(policy_record(self.learner.policy)), _network(there), str(path))
         self.learner.policy.load_state_dict(there["weights"])
         self.learner.take_critics(content.get("learner", {}))
+        self._parents = PolicyCard(**content["card"]).as_parent()
 
 
 def _network(policy: Mapping[str, Any]) -> dict[str, Any]:

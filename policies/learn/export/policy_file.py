@@ -34,6 +34,13 @@ class PolicyCard:
     steps: int
     figures: dict[str, float] = field(default_factory=dict)  # "success_rate", "training_reward", …
     numbers: dict[str, dict[str, Any]] = field(default_factory=dict)  # of the task, in the last lesson
+    parents: list[dict[str, Any]] = field(default_factory=list)
+    """The cards of the legs before, the first one first: each began with the networks of the one before."""
+
+    def as_parent(self) -> list[dict[str, Any]]:
+        """The parents of who begins with these networks."""
+        own = asdict(self)
+        return [*own.pop("parents"), own]
 
     def trusted_task(self, path: Path, how: str) -> str:
         """The task, unless building it would run code that nobody but the file has named; `how` says how to name it.

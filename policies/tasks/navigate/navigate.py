@@ -34,7 +34,7 @@ from policies.tasks.navigate.navigate_kernels import (
 from policies.tasks.navigate.navigate_params import IMPROVED, PARAMS, ROVER, ROVER_PARAMS, NavigateParams
 from policies.tasks.navigate.navigate_top_view import draw
 from policies.tasks.navigate.observe import DEPTH_CHANNELS, LAYOUT_VERSION, RAY_STACK, frame_elements
-from policies.tasks.navigate.scan import scan
+from policies.tasks.navigate.scan import KEPT_SCANS, scan
 from policies.tasks.navigate.settings import NavigateSettings
 from policies.tasks.task_params import Sampler, TaskParam, typed_rows
 from sim.sensors.sensors import sensor_model
@@ -84,7 +84,7 @@ class Navigate(FlightTask):
             self.rig.advance(self._delay_ticks)
         self._command.launch()
         self.rig.advance(DECISION_TICKS - self._delay_ticks)
-        self._see(self.navigation.is_all)
+        self._see(self.navigation.is_all, is_first=False)
         self._judge.launch()
         self.keep_last_images()
         self._begin_rows()
@@ -96,15 +96,16 @@ class Navigate(FlightTask):
         self._place.launch()
         if self._eyes is not None:
             self._eyes.refresh(self.is_growing)
-        self._see(self.is_starting)
+        self._see(self.is_starting, is_first=True)
         self._show.launch()
 
-    def _see(self, rows: Any) -> None:
+    def _see(self, rows: Any, *, is_first: bool) -> None:
         """What the chosen rows see of the forest."""
         if self._eyes is not None:
             self._eyes.take(rows)
         else:
             self._scan.set_param_at_index(2, rows)
+            self._scan.set_param_at_index(5, int(is_first))
             self._scan.launch()
 
     def load_state(self, state: Any) -> None:
@@ -137,7 +138,9 @@ class Navigate(FlightTask):
         state.pos_ned = self._zeros("last_pos_ned", n, wp.vec3)
         state.path_m = self._zeros("path_m", n, float)
         state.start_distance_m = self._zeros("start_distance_m", n, float)
+        state.attitude_errors = self._zeros("attitude_errors", n, wp.quat)
         state.ranges_m = self._zeros("ranges_m", (n, RANGES), float)
+        state.scans_m = self._zeros("scans_m", (n, KEPT_SCANS, RANGES), float)
         state.measures = self._zeros("measures", (n, len(MEASURES)), float)
         state.is_all = wp.full(n, value=True, dtype=wp.bool, device=self.device)
         return state
@@ -154,7 +157,8 @@ class Navigate(FlightTask):
         commands = wp.zeros(self.env_count, dtype=Command, device=self.device)  # of the running decision
         self._act = record(act, buffers, rules, rig, state, commands)
         self._command = record(command, rig, commands)
-        self._scan = record(scan, rig, state.params, state.is_all, rules.has_estimator, state.ranges_m)
+        reported = (rules.has_estimator, state.attitude_errors)
+        self._scan = record(scan, rig, state.params, state.is_all, *reported, 0, state.scans_m, state.ranges_m)
         self._judge = record(judge, buffers, rules, rig, state, start)
         self._prepare = record(prepare, buffers, state, start)
         self._place = record(place, buffers, rig, wp.clone(self.rig.models[:1]), state, start)

@@ -16,12 +16,12 @@ from policies.tasks.episode import StepBuffers, close_step, open_frame
 from policies.tasks.flight.episode_draws import draw_angle
 from policies.tasks.flight.episode_start import Start, ask_for_world, begin_flight, continuous_action
 from policies.tasks.flight.flight_params import FlightParams
-from policies.tasks.flight.flown_vehicle import vehicle_estimate, velocity_setpoint
+from policies.tasks.flight.flown_vehicle import velocity_setpoint
 from policies.tasks.flight.own_state import Command, action_command
 from policies.tasks.navigate.navigate_params import NavigateParams
 from policies.tasks.navigate.observe import write_frame
 from policies.tasks.navigate.reward import navigate_outcome, navigate_reward
-from policies.tasks.navigate.vehicles import goal_shown, own, touches, vary
+from policies.tasks.navigate.vehicles import attitude_error, goal_shown, own, reported_estimate, touches, vary
 from policies.tasks.navigate.walking_goal import follow_speed, walk_vel
 from sim.truth import Truth
 from sim.world.world import World, ground_height, obstacle_contact
@@ -58,7 +58,9 @@ class NavigateState:
     pos_ned: wp.array(dtype=wp.vec3)  # where the vehicle was at the last decision
     path_m: wp.array(dtype=float)
     start_distance_m: wp.array(dtype=float)
-    ranges_m: wp.array2d(dtype=float)  # (envs, RANGES)
+    attitude_errors: wp.array(dtype=wp.quat)  # of the attitude that is told
+    ranges_m: wp.array2d(dtype=float)  # (envs, RANGES) as they are shown
+    scans_m: wp.array3d(dtype=float)  # (envs, KEPT_SCANS, RANGES) as they were measured, newest first
     measures: wp.array2d(dtype=float)  # (envs, MEASURES)
     is_all: wp.array(dtype=wp.bool)  # every row
 
@@ -73,7 +75,7 @@ def goal_vel(buffers: StepBuffers, rules: Rules, state: NavigateState, i: int) -
 @wp.kernel(enable_backward=False)
 def act(buffers: StepBuffers, rules: Rules, rig: Any, state: NavigateState, commands: wp.array(dtype=Command)) -> None:
     i = wp.tid()
-    estimate = vehicle_estimate(rig, i, rules.has_estimator)
+    estimate = reported_estimate(rig, i, rules.has_estimator, state.attitude_errors)
     asked = action_command(continuous_action(buffers, i), estimate.q_ned_from_frd)
     kept_m = state.params[i].kept_m
     if kept_m > 0.0:
@@ -101,6 +103,7 @@ def observe(buffers: StepBuffers, rules: Rules, rig: Any, state: NavigateState, 
     """The newest frame of the observation."""
     at = open_frame(buffers, i)
     shown = own(rig, i, rules.has_estimator)
+    shown.q_ned_from_frd = state.attitude_errors[i] * shown.q_ned_from_frd
     goal_ned = goal_shown(rig, shown, state.goals_ned[i])
     write_frame(rules.has_rays, shown, state.actions[i], goal_ned, state.ranges_m, buffers.observations, i, at)
 
@@ -163,6 +166,7 @@ def place(buffers: StepBuffers, rig: Any, models: Any, state: NavigateState, sta
     episode = buffers.episodes[i] - 1
     params = state.params[i]
     vary(rig, models, start.makes, state.flight[i], seed, i, episode)
+    state.attitude_errors[i] = attitude_error(params.attitude_error_deg, seed, i, episode)
     pos_ned = rig.truth[i].pos_ned
     bearing = draw_angle(seed, i, episode, _BEARING_STREAM)
     fraction = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5

@@ -43,6 +43,8 @@ class NavigateParams:
     turn_cost: float
     kept_m: float
     walk_m_s: float
+    scan_lag_s: float
+    attitude_error_deg: float
 
 
 NAVIGATE_PARAMS = (
@@ -73,6 +75,16 @@ NAVIGATE_PARAMS = (
     TaskParam("turn_cost", 0.001, 0.0, 10.0, "1", "per decision for the squared yaw rate asked for", "tuned"),
     TaskParam("kept_m", 0.0, -10.0, 10.0, "m", "above 0 the goal walks, and is followed so far behind", "ours"),
     TaskParam("walk_m_s", 1.8, 0.0, 5.0, "m/s", "how fast it walks at most", "guess"),
+    TaskParam("scan_lag_s", 0.0, 0.0, 0.3, "s", "age of the ranges that are shown, in steps of 0.1 s", "guess"),
+    TaskParam(
+        "attitude_error_deg",
+        0.0,
+        0.0,
+        10.0,
+        "deg",
+        "of the attitude that is told, about an axis drawn per episode",
+        "guess",
+    ),
 )
 PARAMS = (*FLIGHT_PARAMS, *NAVIGATE_PARAMS)
 ROVER_GOALS_M = {"goal_min_m": 30.0, "goal_max_m": ROVER_GOAL_MAX_M}  # trees and walls stand up to 51 m from home

@@ -205,6 +205,19 @@ def test_a_policy_saved_before_a_setting_of_networks_was_there_is_where_a_new_ru
     torch.testing.assert_close(start.policy.state_dict(), load_policy(old)[0].state_dict(), rtol=0.0, atol=0.0)
 
 
+def test_a_policys_card_has_those_of_the_legs_before_also_after_the_run_went_on(tmp_path):
+    legs = [load_policy(train(config(tmp_path), StopAfter(1)).policy)[1]]
+    for name, before in (("second", "run"), ("third", "second")):
+        given = config(tmp_path, initialize_from=before, run_id=name)
+        train(given, StopAfter(1))
+        resume = given.checkpoint_settings.model_copy(update={"resume": True})
+        resumed = train(given.model_copy(update={"checkpoint_settings": resume}), StopAfter(1))
+        legs.append(load_policy(resumed.policy)[1])
+    assert [len(leg.parents) for leg in legs] == [0, 1, 2]
+    assert [parent["seed"] for parent in legs[2].parents] == [leg.seed for leg in legs[:2]]
+    assert all("parents" not in parent for parent in legs[2].parents)
+
+
 def test_networks_that_do_not_fit_are_refused_with_the_first_difference(tmp_path):
     train(config(tmp_path), StopAfter(1))
     with pytest.raises(CheckpointError, match=r"network_settings\.memory"):

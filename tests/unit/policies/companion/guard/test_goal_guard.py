@@ -147,6 +147,19 @@ def test_a_sector_that_tells_nothing_is_not_clear() -> None:
     assert approach.flown <= S.unseen_speed + 1e-9
 
 
+def test_a_sector_that_misses_once_opens_nothing_and_one_that_tells_so_twice_does() -> None:
+    """A wall 4 m ahead that all sectors miss: what lies behind it is clear with the second scan."""
+    for scans, low, high in ((1, 0.0, 4.0), (2, 5.5, 5.5)):
+        approach = Approach(GoalGuard(S, drives=False), SCANNER, 4.0, 0.0)
+        approach.fly(0.5, ((0.0, 0.0, 0.0), 0.0))
+        for _ in range(scans):
+            approach.ranges.stamp_us += 1
+            approach.ranges.ranges_m = np.full_like(approach.ranges.ranges_m, SCANNER.range_m)
+            approach.guard.sense(approach.own, approach.ranges)
+        flown = approach.guard.filtered(((5.5, 0.0, 0.0), 0.0), approach.own)[0][0]
+        assert low <= flown <= high
+
+
 def test_a_vehicle_that_has_restarted_begins_with_an_empty_map() -> None:
     approach = Approach(GoalGuard(S, drives=False), SCANNER, 8.0, 0.0)
     approach.fly(1.0, ((0.0, 0.0, 0.0), 0.0))
