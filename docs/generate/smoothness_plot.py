@@ -27,29 +27,24 @@ def main() -> None:
 
     config = FlightConfig(world=FOLLOW_WORLD, owner=OwnerConfig(pace="walk"), seed=SEED, wind_m_s=WIND_M_S)
     flight, companion = flight_with_companion(config, load_follower(FOLLOWER), guard=GuardSettings())
-    rows: list[list[float]] = []
+    owner: list[float] = []
 
     def look(watch: FollowWatch) -> None:
-        if watch.sample_count > len(rows):
-            own = flight.rig.rows["truth"][0]["vel_ned"][:2]
-            owner = flight.owner.cast.rows.people.numpy()[0]["vel_ned"][:2]
-            rows.append([*own.tolist(), *owner.tolist()])
+        if watch.sample_count > len(owner):
+            owner.append(float(np.hypot(*flight.owner.cast.rows.people.numpy()[0]["vel_ned"][:2])))
 
     watch = follow_for(flight, companion, SECONDS, look)
     track, smoothness = watch.track(), watch.smoothness()
-    velocities = np.array(rows)
-    time_s = (1.0 + np.arange(len(rows))) * track.interval_s
-    accel = np.hypot(*(np.diff(velocities[:, :2], axis=0) / track.interval_s).T)
     figure, (speeds, distances, accels) = plt.subplots(3, 1, figsize=(8, 6), sharex=True, layout="constrained")
-    speeds.plot(time_s, np.hypot(*velocities[:, 2:].T), label="owner", color="tab:orange")
-    speeds.plot(time_s, np.hypot(*velocities[:, :2].T), label="vehicle", color="tab:blue", linewidth=1.0)
+    speeds.plot(track.time_s, owner, label="owner", color="tab:orange")
+    speeds.plot(track.time_s, np.hypot(*watch.motion[:, :2].T), label="vehicle", color="tab:blue", linewidth=1.0)
     speeds.set_ylabel("level speed [m/s]")
     speeds.legend(loc="upper right", ncols=2)
     distances.axhspan(1.0, 3.0, color="tab:green", alpha=0.15, linewidth=0.0)
-    distances.plot(time_s, track.distance_m[: len(rows)], color="tab:blue")
+    distances.plot(track.time_s, track.distance_m, color="tab:blue")
     distances.set_ylabel("to the chest [m]")
     distances.set_ylim(0.0, 4.0)
-    accels.plot(time_s[1:], accel, color="tab:blue", linewidth=1.0)
+    accels.plot(track.time_s[1:], watch.accel, color="tab:blue", linewidth=1.0)
     accels.axhline(smoothness.accel_rms, color="black", linestyle="--", linewidth=1.0)
     accels.set_ylabel("own level\nacceleration [m/s²]")
     accels.set_xlabel("time [s]")

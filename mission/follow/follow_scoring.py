@@ -159,12 +159,22 @@ class FollowWatch:
             north, east, _ = truth["vel_ned"].tolist()
             self._motion.append((north, east, float(truth["omega_frd"][2])))
 
+    @property
+    def motion(self) -> NDArray[np.float64]:
+        """Of each sample: velocity north and east [m/s], yaw rate [rad/s], true; shape (samples, 3)."""
+        return np.array(self._motion).reshape(-1, 3)
+
+    @property
+    def accel(self) -> NDArray[np.float64]:
+        """Level acceleration [m/s²] from each sample to the next."""
+        north, east, _ = self.motion.T
+        return np.asarray(np.hypot(np.diff(north), np.diff(east)) / DECISION_S)
+
     def smoothness(self) -> Smoothness:
         """Of what was flown so far; zeros before the second sample."""
         if len(self._motion) < 2:
             return Smoothness(0.0, 0.0)
-        north, east, yaw_rate = np.array(self._motion).T
-        accel = np.hypot(np.diff(north), np.diff(east)) / DECISION_S
+        accel, yaw_rate = self.accel, self.motion[:, 2]
         return Smoothness(float(np.sqrt(np.mean(accel**2))), float(np.degrees(np.sqrt(np.mean(yaw_rate**2)))))
 
     def track(self) -> Track | None:

@@ -58,28 +58,26 @@ def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, sec
     owner = OwnerConfig(pace=condition.pace, numbers=dict(condition.numbers))
     config = FlightConfig(owner=owner, world=world, seed=seed, wind_m_s=WINDS_M_S[k % 5])
     flight, companion = flight_with_companion(config, pilot, guard=guard)
-    rows: list[tuple[float, ...]] = []
+    is_hidden: list[bool] = []
     has_touched = False
 
     def look(watch: FollowWatch) -> None:
         nonlocal has_touched
-        if watch.sample_count > len(rows):
+        if watch.sample_count > len(is_hidden):
             truth = flight.rig.rows["truth"][0]
             has_touched = bool(truth["impact_speed"] > 0.0 or truth["is_on_ground"] or truth["is_crashed"])
-            is_hidden = float(flight.owner.cast.rows.drawn.numpy()[0, 0]["stature_m"] <= 0.0)
-            rows.append((is_hidden, *truth["vel_ned"][:2].tolist()))
+            is_hidden.append(bool(flight.owner.cast.rows.drawn.numpy()[0, 0]["stature_m"] <= 0.0))
 
     watch = follow_for(flight, companion, seconds, look)
     track = watch.track()
     if track is None:
         raise ValueError("a flight of no time has no outcome")
-    is_hidden, north, east = np.array(rows).T
+    hidden, (north, east, _) = np.array(is_hidden), watch.motion[: len(is_hidden)].T
     is_collided = bool(track.is_collided.any())
-    distance, speed = track.distance_m[: len(rows)], np.hypot(north, east)
+    distance, speed = track.distance_m[: len(hidden)], np.hypot(north, east)
     bounds = Ranges()
     is_in_band = (distance >= bounds.near_m) & (distance <= bounds.far_m)
     smoothness = watch.smoothness()
-    hidden = is_hidden > 0.0
     return Outcome(
         seed=seed,
         in_band=float(is_in_band.sum() / track.planned_count),
@@ -89,7 +87,7 @@ def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, sec
         nearest_hidden_m=float(distance[hidden].min()) if hidden.any() else nan,
         has_stood=_has_stood(hidden, speed, track.interval_s),
         has_resumed=_has_resumed(hidden, is_in_band, track.interval_s),
-        interventions_per_min=changed_per_min(companion.skill.interventions, len(rows) * track.interval_s),
+        interventions_per_min=changed_per_min(companion.skill.interventions, len(hidden) * track.interval_s),
         accel_rms=smoothness.accel_rms,
         yaw_rate_rms=smoothness.yaw_rate_rms,
         ended_s=float(track.time_s[-1]),

@@ -77,7 +77,7 @@ class GoalGuard:
         self.taken_us = NEVER_US
         """When the newest scan was taken, on the vehicle's clock."""
         self._lit_us = NEVER_US  # when a scan with a return was, the last time
-        self._had_none = np.zeros(0, np.bool_)  # sectors without a return in the scan before
+        self._had_none = np.array(True)  # which sectors had no return in the scan before
         self._has_beams = False  # which see the ground, wherever it is: without any return it is blind
         self._ceiling_m = np.inf  # above the vehicle, by the beams that look up
 
@@ -100,11 +100,12 @@ class GoalGuard:
 
     def _scanned(self, ranges: Ranges, pose: Pose, now_us: int) -> None:
         layout = ranges.layout
-        had_none = self._had_none
-        self._had_none = ranges.ranges_m[: layout.sectors] >= layout.range_m
-        is_reported = ~self._had_none | (had_none if len(had_none) else True)  # one in a hundred misses what is there
-        bearings, sector_m = sectors_of(ranges, is_reported)
-        self._map.sweep(bearings, radians(layout.sector_deg), sector_m, layout.range_m, pose, now_us)
+        has_none = ranges.ranges_m[: layout.sectors] >= layout.range_m
+        has_missed = has_none & ~self._had_none  # one in a hundred sectors misses what is there
+        self._had_none = has_none
+        bearings, sector_m = sectors_of(ranges)
+        counts = ~has_missed[ranges.is_known]
+        self._map.sweep(bearings[counts], radians(layout.sector_deg), sector_m[counts], layout.range_m, pose, now_us)
         beams_m = ranges.ranges_m[layout.sectors :]
         up = [(far_m, elevation) for far_m, elevation in zip(beams_m, layout.beam_elevations_deg, strict=True)]
         over = [float(far_m) * sin(radians(e)) for far_m, e in up if e > 20.0 and far_m < layout.range_m]
@@ -224,9 +225,8 @@ class NoseGuard(GoalGuard):
         return np.stack([off @ (cos, sine), off @ (-sine, cos)], -1)
 
 
-def sectors_of(ranges: Ranges, is_chosen: NDArray[np.bool_] | bool = True) -> tuple[Floats, Floats]:
+def sectors_of(ranges: Ranges) -> tuple[Floats, Floats]:
     """Bearings of the sectors' middles from the nose [rad] and their ranges [m], of those that told something."""
     layout = ranges.layout
     bearings = np.radians(layout.first_edge_deg + layout.sector_deg * (np.arange(layout.sectors) + 0.5))
-    is_reported = ranges.is_known & is_chosen
-    return bearings[is_reported], ranges.ranges_m[: layout.sectors][is_reported].astype(np.float64)
+    return bearings[ranges.is_known], ranges.ranges_m[: layout.sectors][ranges.is_known].astype(np.float64)
