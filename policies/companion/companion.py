@@ -24,6 +24,7 @@ TELEMETRY_OLD_US = 500_000
 HEARTBEAT_OLD_US = 3_000_000  # sent at 1 Hz
 MISFIT = "the policy was made for another kind of vehicle"
 NO_DECISION = "the policy does not decide"
+NOT_ALONE = "another companion is connected"
 LATENCIES_KEPT = 600  # a minute of decisions
 
 STILL: Velocity = ((0.0, 0.0, 0.0), 0.0)
@@ -162,6 +163,8 @@ class Companion:
             return MISFIT
         if time_us - own.heartbeat_us > HEARTBEAT_OLD_US:
             return "no heartbeat of the vehicle"
+        if time_us - self.vehicle.other_us <= HEARTBEAT_OLD_US:
+            return NOT_ALONE
         is_placed = isfinite(own.pos_ned[0])
         if not is_placed or time_us - min(own.attitude_us, own.position_us) > TELEMETRY_OLD_US:
             return "no attitude or position from the vehicle"

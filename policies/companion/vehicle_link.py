@@ -121,6 +121,8 @@ class VehicleLink:
         self._is_refused = False
         self._asked_for: Mode | None = None  # and not answered yet
         self._request_us = NEVER_US
+        self.other_us = NEVER_US
+        """When another companion was heard last, by our own address on its heartbeat."""
 
     def receive(self, time_us: int) -> None:
         """Takes in what has arrived."""
@@ -129,6 +131,8 @@ class VehicleLink:
             listener = self._listeners.get(msg_id)
             if listener is not None:
                 listener(sysid, compid, decode(frame_of(frame)).fields, time_us)
+            if name == "HEARTBEAT" and (sysid, compid) == (self.system_id, COMPONENT):
+                self.other_us = time_us
             if name == "FOLLOW_TARGET":
                 self._owner_reported(decode(frame_of(frame)).fields, time_us)
             elif name is not None and sysid == self.system_id and compid == AUTOPILOT_COMPONENT:

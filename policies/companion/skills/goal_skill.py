@@ -16,7 +16,7 @@ from policies.companion.owner_goal import OwnerGoal
 from policies.companion.ranges import OLD_US, Ranges
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.vector_pilot import VectorPilot
-from policies.companion.vehicle_link import Own, VehicleLink
+from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
 
 DECISION_US, DECISION_EARLY_US = 100_000, 10_000
 DECISION_LATE_US = 50_000  # a scan is waited for so much longer
@@ -143,4 +143,5 @@ class GoalSkill:
     def _figures(self, left_m: float | None, time_us: int) -> str:
         """How far it is to the goal [m], None without one, and how old the scan is."""
         goal = NO_GOAL if left_m is None else f"goal {left_m:.1f} m"
-        return f"{goal} | scan {(time_us - self.ranges.scan_us) * 1e-3:.0f} ms"
+        scan_us = self.ranges.scan_us
+        return f"{goal} | " + ("no scan" if scan_us == NEVER_US else f"scan {(time_us - scan_us) * 1e-3:.0f} ms")

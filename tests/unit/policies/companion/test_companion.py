@@ -8,9 +8,10 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from common.image_stream import ImageFrame
-from policies.companion.companion import MISFIT, NO_DECISION, Companion
+from policies.companion.companion import MISFIT, NO_DECISION, NOT_ALONE, Companion
 from policies.companion.engagement import Phase
 from policies.companion.skills.following import IMAGE_OLD_US, LENS, NO_IMAGES, Following
+from policies.companion.vehicle_link import COMPONENT
 from policies.experts.follower import ScriptedFollower
 
 FRAME_US = 20_000
@@ -96,6 +97,24 @@ def test_a_policy_that_does_not_decide_hands_back_and_sends_no_number_that_is_no
     assert np.isfinite(air.companion.action).all()
     air.pilot.is_lost = False
     air.mode = Mode.HOLD
+    air.run(3.0)
+    assert air.companion.phase is Phase.READY
+
+
+def test_two_companions_at_once_hold_until_one_has_gone():
+    air = Air()
+    air.run(1.0)
+    air.mode = Mode.OFFBOARD
+    air.run(1.0)
+    assert air.companion.phase is Phase.FLYING
+    air.end.send(encode("HEARTBEAT", 1, COMPONENT, 0, type=18, autopilot=8))
+    reported = air.run(0.5)
+    assert air.companion.phase is Phase.HANDING_BACK
+    texts = [m.fields.text for m in reported if m.name == "STATUSTEXT"]
+    assert f"Companion: hold: {NOT_ALONE}" in texts
+    air.mode = Mode.HOLD
+    air.run(2.0)
+    assert air.companion.trouble == NOT_ALONE
     air.run(3.0)
     assert air.companion.phase is Phase.READY
 
