@@ -10,22 +10,17 @@ from enum import Enum
 from math import atan2, isfinite
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
 from common.attitude import wrapped, yaw_of
-from policies.companion.guard.limits import (
-    CLIMB_M_S,
-    closing_max,
-    faded,
-    kept_off,
-    stopping_speed,
-    within_heights,
-)
+from policies.companion.guard.limits import CLIMB_M_S, faded, stopping_speed, within_heights
 from policies.companion.guard.rollouts import Somebody, clear_velocity
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
 from policies.companion.vehicle_link import NEVER_US, Own
+from policies.tasks.follow_me.tracked.keep_off import closing_max, distance_then, keep_off, kept_off
 
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
@@ -58,6 +53,7 @@ class Guard:
     def __init__(self, settings: GuardSettings, senses: Senses) -> None:
         self.settings = settings
         self.senses = senses
+        self._keep_off = keep_off(settings.owner_m, settings.owner_brake, settings.reaction_s)
         self.stance = Stance.FREE
         self.interventions: Counter[str] = Counter()
         """How many decisions were changed, by the reason."""
@@ -146,13 +142,11 @@ class Guard:
         if known is None:
             return level, None
         way = known[0][:2] - np.array(own.pos_ned[:2])
-        vel, own_vel = known[1][:2], np.array(own.vel_ned[:2])
-        far_m = float(np.hypot(*way))
-        unit = way / max(far_m, 1e-3)
-        then_m = far_m - delay_s * max(float((own_vel - vel) @ unit), 0.0)
+        motion = wp.vec2(*way), wp.vec2(*own.vel_ned[:2]), wp.vec2(*known[1][:2]), delay_s
+        then_m, most = distance_then(*motion), closing_max(self._keep_off, *motion)
         self._is_too_near = then_m < s.owner_m
-        owner = Somebody(unit, closing_max(way, own_vel, vel, delay_s, s), then_m < s.pressed_m)
-        kept = kept_off(level, unit, owner.closing_max)
+        owner = Somebody(way / max(float(np.hypot(*way)), 1e-3), most, then_m < s.pressed_m)
+        kept = np.array(kept_off(wp.vec2(*level), motion[0], most))
         self._count("near the owner", level, kept)
         return kept, owner
 

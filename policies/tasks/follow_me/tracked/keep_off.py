@@ -1,0 +1,74 @@
+"""How fast a vehicle may come nearer to somebody: the guard's rule, and what policies are trained under.
+
+Whoever goes may stop, and whoever comes is given way to; late pictures count as so much more time until the vehicle
+answers. One source: a guard calls these functions from Python, training in kernels.
+"""
+
+from typing import Any
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+OWNER_M = 1.1  # [m] to the middle of the person: it comes no nearer
+OWNER_BRAKE_M_S2 = 2.0  # with which the vehicle is taken to brake before them
+REACTION_S = 0.35  # from a setpoint to the motion, besides the age of the picture; measured on the x500
+ESCAPE_CLIMB_M_S = 1.5  # nearer than allowed it climbs as well
+SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
+_STOPS_M_S2 = wp.constant(4.0)  # how fast a person stops; guess
+_DOUBT_M_S = wp.constant(0.4)  # of the speed that the tracker says; guess
+_BACK_GAIN = wp.constant(3.0)  # [1/s]
+_BACK_MAX_M_S = wp.constant(4.0)
+
+
+@wp.struct
+class KeepOff:
+    """Its numbers."""
+
+    owner_m: float
+    brake: float
+    reaction_s: float
+
+
+def keep_off(owner_m: float = OWNER_M, brake: float = OWNER_BRAKE_M_S2, reaction_s: float = REACTION_S) -> Any:
+    """The rule: how near [m], braking at [m/s²], after a reaction [s]."""
+    k = KeepOff()
+    k.owner_m, k.brake, k.reaction_s = owner_m, brake, reaction_s
+    return k
+
+
+@wp.func
+def braking_from(room_m: float, brake: float) -> float:
+    """The speed [m/s] from which one stands within a way [m], braking at so much [m/s²]."""
+    return wp.sqrt(2.0 * brake * wp.max(room_m, 0.0))
+
+
+@wp.func
+def distance_then(way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, delay_s: float) -> float:
+    """How far away they are [m] when the vehicle answers, if both go on."""
+    far_m = wp.max(wp.length(way), 1.0e-3)
+    return far_m - delay_s * wp.max(wp.dot(own_vel - other_vel, way) / far_m, 0.0)
+
+
+@wp.func
+def closing_max(k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, delay_s: float) -> float:
+    """How fast it may come nearer to somebody [m/s]; negative: it has to give way.
+
+    `way` leads to them [m]; `own_vel` it has until it answers, `delay_s` from now; who goes away may stop meanwhile.
+    """
+    far_m = wp.max(wp.length(way), 1.0e-3)
+    leaving = wp.dot(other_vel, way) / far_m
+    trusted = leaving
+    if leaving >= 0.0:
+        trusted = wp.max(leaving - _STOPS_M_S2 * delay_s - _DOUBT_M_S, 0.0)
+    room_m = distance_then(way, own_vel, other_vel, delay_s) - k.owner_m
+    if room_m > 0.0:
+        return trusted + braking_from(room_m, k.brake)
+    return wp.max(trusted + _BACK_GAIN * room_m, -_BACK_MAX_M_S)
+
+
+@wp.func
+def kept_off(velocity: wp.vec2, way: wp.vec2, most: float) -> wp.vec2:
+    """A level velocity without what is faster towards somebody than it may be [m/s]."""
+    unit = way / wp.max(wp.length(way), 1.0e-3)
+    return velocity - wp.max(wp.dot(velocity, unit) - most, 0.0) * unit
