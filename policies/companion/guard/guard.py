@@ -20,7 +20,7 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
 from policies.companion.vehicle_link import NEVER_US, Own
-from policies.tasks.follow_me.tracked.keep_off import closing_max, distance_then, keep_off, kept_off
+from policies.tasks.follow_me.tracked.keep_off import OVER_M, closing_max, distance_then, keep_off, kept_off
 
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
@@ -60,6 +60,7 @@ class Guard:
         self._begun_us = 0  # when the policy took over, on the vehicle's clock
         self._flown = np.zeros(2)  # what was let be flown last
         self._is_too_near = False
+        self._over_m = 0.0  # above the owner's chest
         self._risen_us = NEVER_US  # when it rose over the owner last
 
     def begin(self, own: Own) -> None:
@@ -92,7 +93,7 @@ class Guard:
             scale = faded(silence_s, s.slow_s, s.stop_s) * faded(age_s, s.image_slow_s, s.image_stop_s)
             level, down = scale * level, scale * down
             self.interventions[self.stance.value] += 1
-        level, owner = self._past_owner(level, own, s.reaction_s + age_s)
+        level, owner = self._past_owner(level, own, age_s)
         level = self._flown = self._past_solids(level, own, owner)
         down = self._within_heights(down, own)
         return (float(level[0]), float(level[1]), float(down)), yaw_rate
@@ -135,16 +136,17 @@ class Guard:
         error = wrapped(bearing_rad - yaw_of(own.q_ned_from_frd))
         return float(np.clip(_FACE_GAIN * error, -_YAW_MAX, _YAW_MAX))
 
-    def _past_owner(self, level: Floats, own: Own, delay_s: float) -> tuple[Floats, Somebody | None]:
+    def _past_owner(self, level: Floats, own: Own, age_s: float) -> tuple[Floats, Somebody | None]:
         """The velocity without what brings it too near to the owner, and what it has to do with them."""
         known, s = self.senses.owner_now(own), self.settings
         self._is_too_near = False
         if known is None:
             return level, None
         way = known[0][:2] - np.array(own.pos_ned[:2])
-        motion = wp.vec2(*way), wp.vec2(*own.vel_ned[:2]), wp.vec2(*known[1][:2]), delay_s
-        then_m, most = distance_then(*motion), closing_max(self._keep_off, *motion)
-        self._is_too_near = then_m < s.owner_m
+        motion = wp.vec2(*way), wp.vec2(*own.vel_ned[:2]), wp.vec2(*known[1][:2])
+        then_m = distance_then(*motion, s.reaction_s + age_s)
+        self._is_too_near, self._over_m = then_m < s.owner_m, float(known[0][2]) - own.pos_ned[2]
+        most = closing_max(self._keep_off, *motion, age_s)
         owner = Somebody(way / max(float(np.hypot(*way)), 1e-3), most, then_m < s.pressed_m)
         kept = np.array(kept_off(wp.vec2(*level), motion[0], most))
         self._count("near the owner", level, kept)
@@ -163,9 +165,10 @@ class Guard:
     def _within_heights(self, down: float, own: Own) -> float:
         s = self.settings
         if self._is_too_near and not own.range_m > s.height_max_m:
-            self.interventions["over the owner"] += 1
             self._risen_us = own.boot_us
-            return -s.escape_climb
+            if self._over_m < OVER_M:
+                self.interventions["over the owner"] += 1
+                return -s.escape_climb
         if own.boot_us - self._risen_us < _RISEN_US:  # they may be right below, where it cannot see them
             down = min(down, 0.0)
         return within_heights(down, own.range_m, s)

@@ -203,7 +203,7 @@ SEEN_BY_TRACKER: dict[str, float | Sampler] = {
     "bystanders": Sampler(mean=0.0, st_dev=0.8),
     "start_distance_min_m": 1.5,
     "start_distance_max_m": Sampler(intervals=((3.0, 5.0), (3.0, 8.0))),
-    "image_lag_s": Sampler(mean=0.05, st_dev=0.12),
+    "image_lag_s": Sampler(intervals=((0.0, 0.1), (0.0, 0.35))),
     "image_jitter_s": Sampler(mean=0.0, st_dev=0.05),
     "image_loss": Sampler(mean=0.0, st_dev=0.05),
     "image_freezes_per_min": Sampler(mean=0.0, st_dev=1.0),

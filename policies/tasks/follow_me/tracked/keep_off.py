@@ -1,7 +1,9 @@
 """How fast a vehicle may come nearer to somebody: the guard's rule, and what policies are trained under.
 
-Whoever goes may stop, and whoever comes is given way to; late pictures count as so much more time until the vehicle
-answers. One source: a guard calls these functions from Python, training in kernels.
+Whoever walks away may have begun to stop when they were seen last; the way that takes them is room for the vehicle to
+stop in, after its reaction: the safe distance of responsibility-sensitive safety (Shalev-Shwartz et al. 2017, arXiv
+1708.06374), with late pictures. Whoever comes is given way to. One source: a guard calls these functions from Python,
+training in kernels.
 """
 
 from typing import Any
@@ -10,13 +12,14 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-OWNER_M = 1.1  # [m] to the middle of the person: it comes no nearer
-OWNER_BRAKE_M_S2 = 2.0  # with which the vehicle is taken to brake before them
+OWNER_M = 1.0  # [m] to the middle of the person: it comes no nearer
+OWNER_BRAKE_M_S2 = 4.5  # with which the vehicle is taken to brake before them
 REACTION_S = 0.35  # from a setpoint to the motion, besides the age of the picture; measured on the x500
 ESCAPE_CLIMB_M_S = 1.5  # nearer than allowed it climbs as well
+OVER_M = 1.5  # so far above their chest it is over their head and need climb no more
 SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
-_STOPS_M_S2 = wp.constant(4.0)  # how fast a person stops; guess
-_DOUBT_M_S = wp.constant(0.4)  # of the speed that the tracker says; guess
+_STOPS_M_S2 = wp.constant(2.5)  # how fast a person stops; guess
+_DOUBT_M_S = wp.constant(0.2)  # of the speed that the tracker says; guess
 _BACK_GAIN = wp.constant(3.0)  # [1/s]
 _BACK_MAX_M_S = wp.constant(4.0)
 
@@ -38,9 +41,10 @@ def keep_off(owner_m: float = OWNER_M, brake: float = OWNER_BRAKE_M_S2, reaction
 
 
 @wp.func
-def braking_from(room_m: float, brake: float) -> float:
-    """The speed [m/s] from which one stands within a way [m], braking at so much [m/s²]."""
-    return wp.sqrt(2.0 * brake * wp.max(room_m, 0.0))
+def stopping_speed(room_m: float, delay_s: float, brake: float) -> float:
+    """The speed [m/s] from which one stands within a way [m], braking at so much [m/s²] after a delay [s]."""
+    lag = brake * delay_s
+    return wp.sqrt(lag * lag + 2.0 * brake * wp.max(room_m, 0.0)) - lag
 
 
 @wp.func
@@ -51,20 +55,24 @@ def distance_then(way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, delay_s: f
 
 
 @wp.func
-def closing_max(k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, delay_s: float) -> float:
+def closing_max(k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, age_s: float) -> float:
     """How fast it may come nearer to somebody [m/s]; negative: it has to give way.
 
-    `way` leads to them [m]; `own_vel` it has until it answers, `delay_s` from now; who goes away may stop meanwhile.
+    `way` leads to where they would be by now [m]; `own_vel` it has until it answers; `age_s` ago they were seen.
     """
     far_m = wp.max(wp.length(way), 1.0e-3)
     leaving = wp.dot(other_vel, way) / far_m
-    trusted = leaving
-    if leaving >= 0.0:
-        trusted = wp.max(leaving - _STOPS_M_S2 * delay_s - _DOUBT_M_S, 0.0)
-    room_m = distance_then(way, own_vel, other_vel, delay_s) - k.owner_m
-    if room_m > 0.0:
-        return trusted + braking_from(room_m, k.brake)
-    return wp.max(trusted + _BACK_GAIN * room_m, -_BACK_MAX_M_S)
+    room_m = far_m - k.owner_m
+    given = wp.min(leaving, 0.0)
+    if leaving > 0.0:
+        sure = wp.max(leaving - _DOUBT_M_S, 0.0)
+        room_m += 0.5 * sure * sure / _STOPS_M_S2 - leaving * age_s
+    else:
+        room_m += leaving * (age_s + k.reaction_s)
+    left_m = room_m - k.reaction_s * wp.max(wp.dot(own_vel, way) / far_m, 0.0)
+    if left_m > 0.0:
+        return given + wp.min(stopping_speed(room_m, k.reaction_s, k.brake), stopping_speed(left_m, 0.0, k.brake))
+    return wp.max(given + _BACK_GAIN * left_m, -_BACK_MAX_M_S)
 
 
 @wp.func
