@@ -20,7 +20,7 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
 from policies.companion.vehicle_link import NEVER_US, Own
-from policies.tasks.follow_me.tracked.keep_off import OVER_M, closing_max, distance_then, keep_off, kept_off
+from policies.tasks.follow_me.tracked.keep_off import closing_max, distance_then, keep_off, kept_off, sinking_max
 
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
@@ -53,14 +53,14 @@ class Guard:
     def __init__(self, settings: GuardSettings, senses: Senses) -> None:
         self.settings = settings
         self.senses = senses
-        self._keep_off = keep_off(settings.owner_m, settings.owner_brake, settings.reaction_s)
+        self._keep_off = keep_off(settings.owner_m, settings.owner_brake, settings.reaction_s, settings.escape_climb)
         self.stance = Stance.FREE
         self.interventions: Counter[str] = Counter()
         """How many decisions were changed, by the reason."""
         self._begun_us = 0  # when the policy took over, on the vehicle's clock
         self._flown = np.zeros(2)  # what was let be flown last
         self._is_too_near = False
-        self._over_m = 0.0  # above the owner's chest
+        self._sinking_max = 0.0  # [m/s] of who is too near
         self._risen_us = NEVER_US  # when it rose over the owner last
 
     def begin(self, own: Own) -> None:
@@ -145,7 +145,8 @@ class Guard:
         way = known[0][:2] - np.array(own.pos_ned[:2])
         motion = wp.vec2(*way), wp.vec2(*own.vel_ned[:2]), wp.vec2(*known[1][:2])
         then_m = distance_then(*motion, s.reaction_s + age_s)
-        self._is_too_near, self._over_m = then_m < s.owner_m, float(known[0][2]) - own.pos_ned[2]
+        self._is_too_near = then_m < s.owner_m
+        self._sinking_max = sinking_max(self._keep_off, float(known[0][2]) - own.pos_ned[2], then_m)
         most = closing_max(self._keep_off, *motion, age_s)
         owner = Somebody(way / max(float(np.hypot(*way)), 1e-3), most, then_m < s.pressed_m)
         kept = np.array(kept_off(wp.vec2(*level), motion[0], most))
@@ -166,9 +167,9 @@ class Guard:
         s = self.settings
         if self._is_too_near and not own.range_m > s.height_max_m:
             self._risen_us = own.boot_us
-            if self._over_m < OVER_M:
+            if self._sinking_max < min(down, 0.0):
                 self.interventions["over the owner"] += 1
-                return -s.escape_climb
+                return self._sinking_max
         if own.boot_us - self._risen_us < _RISEN_US:  # they may be right below, where it cannot see them
             down = min(down, 0.0)
         return within_heights(down, own.range_m, s)

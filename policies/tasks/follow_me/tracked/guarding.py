@@ -8,21 +8,19 @@ import warp as wp
 
 from policies.tasks.flight.own_state import Command, OwnState
 from policies.tasks.follow_me.tracked.keep_off import (
-    ESCAPE_CLIMB_M_S,
-    OVER_M,
     SLOW_S,
     STOP_S,
     KeepOff,
     closing_max,
     distance_then,
     kept_off,
+    sinking_max,
 )
 from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, place_now, velocity_now
 
 wp.set_module_options({"enable_backward": False})
 
 _SLOW_S, _STOP_S = wp.constant(SLOW_S), wp.constant(STOP_S)
-_ESCAPE_CLIMB_M_S, _OVER_M = wp.constant(ESCAPE_CLIMB_M_S), wp.constant(OVER_M)
 
 
 @wp.func
@@ -36,10 +34,8 @@ def guarded(command: Command, own: OwnState, owner: OwnerFilter, image_age_s: fl
     own_vel, owner_vel = wp.vec2(own.vel_ned[0], own.vel_ned[1]), velocity_now(owner)
     most = closing_max(k, way, own_vel, owner_vel, image_age_s)
     level = kept_off(scale * wp.vec2(command.vel_ned[0], command.vel_ned[1]), way, most)
-    down = scale * command.vel_ned[2]
-    if distance_then(way, own_vel, owner_vel, k.reaction_s + image_age_s) < k.owner_m:
-        down = wp.min(down, 0.0)
-        if place[2] - own.pos_ned[2] < _OVER_M:
-            down = -_ESCAPE_CLIMB_M_S
+    then_m = distance_then(way, own_vel, owner_vel, k.reaction_s + image_age_s)
+    sinking = sinking_max(k, place[2] - own.pos_ned[2], then_m)
+    down = wp.min(scale * command.vel_ned[2], sinking)
     command.vel_ned = wp.vec3(level[0], level[1], down)
     return command

@@ -29,7 +29,9 @@ wp.set_module_options({"enable_backward": False})
 
 SECTORS = 24  # round the vehicle, from its heading clockwise
 REACH_M = wp.constant(8.0)  # what is farther away is not told
-APPROACH = wp.constant(0.4)  # of the way to what an action says, a decision: some 0.2 s
+APPROACH = wp.constant(0.4)  # of the way to what an action says, a decision: some 0.2 s;
+CALM_APPROACH = wp.constant(0.15)  # to what is nearly the same, as far as noise reaches, some 0.6 s
+CALM_M_S = wp.constant(0.8)
 ACCEL_MAX_M_S2 = wp.constant(6.0)  # of the level velocity asked for
 _DT_S = wp.constant(DECISION_S)
 _SECTORS = wp.constant(SECTORS)
@@ -64,7 +66,8 @@ TRACKED_ELEMENTS = (
 def next_command(last: Command, action: wp.vec4, q_ned_from_frd: wp.quat) -> Command:
     """What is asked for after a decision: the last, and some of the way to what the action says."""
     said = action_command(action, q_ned_from_frd)
-    step = APPROACH * (said.vel_ned - last.vel_ned)
+    step = said.vel_ned - last.vel_ned
+    step = step * (CALM_APPROACH + (APPROACH - CALM_APPROACH) * wp.min(wp.length(step) / CALM_M_S, 1.0))
     longest = _DT_S * ACCEL_MAX_M_S2
     step = step * wp.min(1.0, longest / wp.max(wp.sqrt(step[0] * step[0] + step[1] * step[1]), 1.0e-6))
     out = Command()
