@@ -92,6 +92,7 @@ class Guard:
         elif self.stance is not Stance.FREE:
             scale = faded(silence_s, s.slow_s, s.stop_s) * faded(age_s, s.image_slow_s, s.image_stop_s)
             level, down = scale * level, scale * down
+            yaw_rate = self._facing_owner(own, yaw_rate)
             self.interventions[self.stance.value] += 1
         level, owner = self._past_owner(level, own, age_s)
         level = self._flown = self._past_solids(level, own, owner)
@@ -131,6 +132,14 @@ class Guard:
         if is_searching:
             return np.zeros(2), down, s.search_yaw_rate
         return np.zeros(2), down, self._facing(self.senses.bearing_rad, own)
+
+    def _facing_owner(self, own: Own, yaw_rate: float) -> float:
+        """Towards where sights and phone put an owner who is not seen; a yaw rate if nobody knows."""
+        known = self.senses.owner_now(own)
+        if known is None or not self.senses.is_heard:
+            return yaw_rate
+        way = known[0][:2] - np.array(own.pos_ned[:2])
+        return self._facing(atan2(way[1], way[0]), own)
 
     def _facing(self, bearing_rad: float, own: Own) -> float:
         error = wrapped(bearing_rad - yaw_of(own.q_ned_from_frd))
