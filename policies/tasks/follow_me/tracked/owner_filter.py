@@ -19,8 +19,8 @@ from policies.tasks.follow_me.tracked.motion_filter import (
 
 wp.set_module_options({"enable_backward": False})
 
-STEADY_NSD2 = wp.constant(0.15)  # [m²/s³] of the velocity of who goes on,
-TURNING_NSD2 = wp.constant(6.0)  # and of who turns, stops or sets off
+STEADY_NSD2 = wp.constant(0.1)  # [m²/s³] of the velocity of who goes on,
+TURNING_NSD2 = wp.constant(2.0)  # and of who turns, stops or sets off
 TURNS_EVERY_S = wp.constant(3.0)
 TURNS_FOR_S = wp.constant(0.7)
 START_SPEED_STD = wp.constant(1.5)  # [m/s] of somebody new
