@@ -155,8 +155,9 @@ class Guard:
         motion = wp.vec2(*way), wp.vec2(*own.vel_ned[:2]), wp.vec2(*known[1][:2])
         then_m = distance_then(*motion, s.reaction_s + age_s)
         self._is_too_near = then_m < s.owner_m
-        self._sinking_max = sinking_max(self._keep_off, float(known[0][2]) - own.pos_ned[2], then_m)
-        most = closing_max(self._keep_off, *motion, age_s)
+        over_m = float(known[0][2]) - own.pos_ned[2]
+        self._sinking_max = sinking_max(self._keep_off, over_m, then_m)
+        most = closing_max(self._keep_off, *motion, age_s, over_m)
         owner = Somebody(way / max(float(np.hypot(*way)), 1e-3), most, then_m < s.pressed_m)
         kept = np.array(kept_off(wp.vec2(*level), motion[0], most))
         self._count("near the owner", level, kept)

@@ -185,7 +185,7 @@ DOCUMENTED: dict[str, float | Sampler] = {
 }
 # What a day outside may bring.
 IMPROVED: dict[str, float | Sampler] = {
-    "wind_m_s": Sampler(intervals=((0.0, 6.0),)),
+    "wind_m_s": Sampler(intervals=((0.0, 8.0),)),
     "wind_gust_m_s": Sampler(intervals=((0.0, 3.0),)),
     "sensor_noise": Sampler(intervals=((0.5, 1.5),)),
     "mass_scale": Sampler(intervals=((0.9, 1.15),)),

@@ -32,10 +32,11 @@ def guarded(command: Command, own: OwnState, owner: OwnerFilter, image_age_s: fl
     place = place_now(owner)
     way = wp.vec2(place[0] - own.pos_ned[0], place[1] - own.pos_ned[1])
     own_vel, owner_vel = wp.vec2(own.vel_ned[0], own.vel_ned[1]), velocity_now(owner)
-    most = closing_max(k, way, own_vel, owner_vel, image_age_s)
+    over_m = place[2] - own.pos_ned[2]
+    most = closing_max(k, way, own_vel, owner_vel, image_age_s, over_m)
     level = kept_off(scale * wp.vec2(command.vel_ned[0], command.vel_ned[1]), way, most)
     then_m = distance_then(way, own_vel, owner_vel, k.reaction_s + image_age_s)
-    sinking = sinking_max(k, place[2] - own.pos_ned[2], then_m)
+    sinking = sinking_max(k, over_m, then_m)
     down = wp.min(scale * command.vel_ned[2], sinking)
     command.vel_ned = wp.vec3(level[0], level[1], down)
     return command

@@ -68,14 +68,24 @@ def distance_then(way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, delay_s: f
 
 
 @wp.func
-def closing_max(k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, age_s: float) -> float:
+def level_m(k: KeepOff, over_m: float) -> float:
+    """How near it may come on the level [m], so far above their chest: an ellipsoid about them, free of it above."""
+    share = wp.clamp(over_m / _OVER_M, 0.0, 1.0)
+    return k.owner_m * wp.sqrt(1.0 - share * share)
+
+
+@wp.func
+def closing_max(
+    k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, age_s: float, over_m: float
+) -> float:
     """How fast it may come nearer to somebody [m/s]; negative: it has to give way.
 
-    `way` leads to where they would be by now [m]; `own_vel` it has until it answers; `age_s` ago they were seen.
+    `way` leads to where they would be by now [m]; `own_vel` it has until it answers; `age_s` ago they were seen;
+    so far above their chest.
     """
     far_m = wp.max(wp.length(way), 1.0e-3)
     leaving = wp.dot(other_vel, way) / far_m
-    room_m = far_m - k.owner_m
+    room_m = far_m - level_m(k, over_m)
     given = wp.min(leaving, 0.0)
     if leaving > 0.0:
         sure = wp.max(leaving - _DOUBT_M_S, 0.0)
