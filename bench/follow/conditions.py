@@ -32,6 +32,8 @@ _SPEEDS_M_S = {"walk": WALK_SPEED_M_S, "run": RUN_SPEED_M_S}
 def main(
     policies: list[Path],
     condition: Annotated[list[str] | None, typer.Option(help="Default: all without hiding.")] = None,
+    *,
+    guard: Annotated[bool, typer.Option(help="Under the guard's rules of the owner; not of trees.")] = True,
 ) -> None:
     names = condition or [name for name in BY_NAME if not name.startswith("gone")]
     table = Table("policy", "condition", "in band", "collided")
@@ -42,7 +44,7 @@ def main(
         for name in names:
             pace, numbers = BY_NAME[name].pace, BY_NAME[name].numbers
             tracks, _ = first_episodes(
-                policy, task, {**_USUAL, **_AIR, "owner_speed_max": _SPEEDS_M_S[pace], **numbers}
+                policy, task, {**_USUAL, **_AIR, "owner_speed_max": _SPEEDS_M_S[pace], "guard": guard, **numbers}
             )
             card = scorecard(tracks)
             table.add_row(str(path), name, written(card.in_band, "%"), written(card.collision, "%"))

@@ -10,22 +10,17 @@ from enum import Enum
 from math import atan2, isfinite
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
 from common.attitude import wrapped, yaw_of
-from policies.companion.guard.limits import (
-    CLIMB_M_S,
-    closing_max,
-    faded,
-    kept_off,
-    stopping_speed,
-    within_heights,
-)
+from policies.companion.guard.limits import CLIMB_M_S, faded, stopping_speed, within_heights
 from policies.companion.guard.rollouts import Somebody, clear_velocity
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
 from policies.companion.vehicle_link import NEVER_US, Own
+from policies.tasks.follow_me.tracked.keep_off import closing_max, distance_then, keep_off, kept_off, sinking_max
 
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
@@ -58,12 +53,14 @@ class Guard:
     def __init__(self, settings: GuardSettings, senses: Senses) -> None:
         self.settings = settings
         self.senses = senses
+        self._keep_off = keep_off(settings.owner_m, settings.owner_brake, settings.reaction_s, settings.escape_climb)
         self.stance = Stance.FREE
         self.interventions: Counter[str] = Counter()
         """How many decisions were changed, by the reason."""
         self._begun_us = 0  # when the policy took over, on the vehicle's clock
         self._flown = np.zeros(2)  # what was let be flown last
         self._is_too_near = False
+        self._sinking_max = 0.0  # [m/s] of who is too near
         self._risen_us = NEVER_US  # when it rose over the owner last
 
     def begin(self, own: Own) -> None:
@@ -95,8 +92,9 @@ class Guard:
         elif self.stance is not Stance.FREE:
             scale = faded(silence_s, s.slow_s, s.stop_s) * faded(age_s, s.image_slow_s, s.image_stop_s)
             level, down = scale * level, scale * down
+            yaw_rate = self._facing_owner(own, yaw_rate)
             self.interventions[self.stance.value] += 1
-        level, owner = self._past_owner(level, own, s.reaction_s + age_s)
+        level, owner = self._past_owner(level, own, age_s)
         level = self._flown = self._past_solids(level, own, owner)
         down = self._within_heights(down, own)
         return (float(level[0]), float(level[1]), float(down)), yaw_rate
@@ -135,24 +133,33 @@ class Guard:
             return np.zeros(2), down, s.search_yaw_rate
         return np.zeros(2), down, self._facing(self.senses.bearing_rad, own)
 
+    def _facing_owner(self, own: Own, yaw_rate: float) -> float:
+        """Towards where sights and phone put an owner who is not seen; a yaw rate if nobody knows."""
+        known = self.senses.owner_now(own)
+        if known is None or not self.senses.is_heard:
+            return yaw_rate
+        way = known[0][:2] - np.array(own.pos_ned[:2])
+        return self._facing(atan2(way[1], way[0]), own)
+
     def _facing(self, bearing_rad: float, own: Own) -> float:
         error = wrapped(bearing_rad - yaw_of(own.q_ned_from_frd))
         return float(np.clip(_FACE_GAIN * error, -_YAW_MAX, _YAW_MAX))
 
-    def _past_owner(self, level: Floats, own: Own, delay_s: float) -> tuple[Floats, Somebody | None]:
+    def _past_owner(self, level: Floats, own: Own, age_s: float) -> tuple[Floats, Somebody | None]:
         """The velocity without what brings it too near to the owner, and what it has to do with them."""
         known, s = self.senses.owner_now(own), self.settings
         self._is_too_near = False
         if known is None:
             return level, None
         way = known[0][:2] - np.array(own.pos_ned[:2])
-        vel, own_vel = known[1][:2], np.array(own.vel_ned[:2])
-        far_m = float(np.hypot(*way))
-        unit = way / max(far_m, 1e-3)
-        then_m = far_m - delay_s * max(float((own_vel - vel) @ unit), 0.0)
+        motion = wp.vec2(*way), wp.vec2(*own.vel_ned[:2]), wp.vec2(*known[1][:2])
+        then_m = distance_then(*motion, s.reaction_s + age_s)
         self._is_too_near = then_m < s.owner_m
-        owner = Somebody(unit, closing_max(way, own_vel, vel, delay_s, s), then_m < s.pressed_m)
-        kept = kept_off(level, unit, owner.closing_max)
+        over_m = float(known[0][2]) - own.pos_ned[2]
+        self._sinking_max = sinking_max(self._keep_off, over_m, then_m)
+        most = closing_max(self._keep_off, *motion, age_s, over_m)
+        owner = Somebody(way / max(float(np.hypot(*way)), 1e-3), most, then_m < s.pressed_m)
+        kept = np.array(kept_off(wp.vec2(*level), motion[0], most))
         self._count("near the owner", level, kept)
         return kept, owner
 
@@ -169,9 +176,10 @@ class Guard:
     def _within_heights(self, down: float, own: Own) -> float:
         s = self.settings
         if self._is_too_near and not own.range_m > s.height_max_m:
-            self.interventions["over the owner"] += 1
             self._risen_us = own.boot_us
-            return -s.escape_climb
+            if self._sinking_max < min(down, 0.0):
+                self.interventions["over the owner"] += 1
+                return self._sinking_max
         if own.boot_us - self._risen_us < _RISEN_US:  # they may be right below, where it cannot see them
             down = min(down, 0.0)
         return within_heights(down, own.range_m, s)

@@ -26,31 +26,6 @@ def braking_speed(free_m: float, own_m_s: float, delay_s: float, brake: float) -
     return min(most, stopping_speed(free_m - delay_s * max(own_m_s, 0.0), 0.0, brake))
 
 
-def closing_max(way: Floats, own_vel: Floats, other_vel: Floats, delay_s: float, s: GuardSettings) -> float:
-    """How fast it may come nearer to somebody [m/s]; negative: it has to give way.
-
-    Args:
-        way: from here to them [m].
-        own_vel: [m/s] of now, which it has until it answers.
-        other_vel: [m/s] theirs; who goes away may stop meanwhile.
-        delay_s: until it answers.
-        s: of the guard.
-    """
-    far_m = max(float(np.hypot(*way)), 1e-3)
-    unit = way / far_m
-    leaving = float(other_vel @ unit)
-    trusted = leaving if leaving < 0.0 else max(leaving - _STOPS_M_S2 * delay_s - _DOUBT_M_S, 0.0)
-    room_m = far_m - s.owner_m - delay_s * max(float(own_vel @ unit) - leaving, 0.0)
-    if room_m > 0.0:
-        return trusted + stopping_speed(room_m, 0.0, s.owner_brake)
-    return max(trusted + _BACK_GAIN * room_m, -_BACK_MAX_M_S)
-
-
-def kept_off(velocity: Floats, unit: Floats, most: float) -> Floats:
-    """A level velocity without what is faster towards somebody than it may be [m/s]."""
-    return velocity - max(float(velocity @ unit) - most, 0.0) * unit
-
-
 def way_along_m(points: Floats, curvature: float, is_backwards: bool, s: GuardSettings) -> float:
     """How far [m] a vehicle on wheels gets along an arc before its hull comes too near to a point.
 
@@ -101,9 +76,3 @@ def within_heights(down: float, height_m: float, s: GuardSettings) -> float:
 def faded(age_s: float, from_s: float, to_s: float) -> float:
     """1 until one age, 0 from another on."""
     return float(np.clip((to_s - age_s) / (to_s - from_s), 0.0, 1.0))
-
-
-_STOPS_M_S2 = 4.0  # how fast a person stops; guess
-_DOUBT_M_S = 0.4  # of the speed that the tracker says; guess
-_BACK_GAIN = 3.0  # [1/s]
-_BACK_MAX_M_S = 4.0

@@ -2,6 +2,15 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from policies.tasks.follow_me.tracked.keep_off import (
+    ESCAPE_CLIMB_M_S,
+    OWNER_BRAKE_M_S2,
+    OWNER_M,
+    REACTION_S,
+    SLOW_S,
+    STOP_S,
+)
+
 
 class GuardSettings(BaseModel):
     """What the guard allows."""
@@ -9,9 +18,9 @@ class GuardSettings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     is_on: bool = True
-    slow_s: float = Field(default=0.7, gt=0.0)
+    slow_s: float = Field(default=SLOW_S, gt=0.0)
     """Without a sight of the owner for so long it becomes slower ..."""
-    stop_s: float = Field(default=2.0, gt=0.0)
+    stop_s: float = Field(default=STOP_S, gt=0.0)
     """... until it stands."""
     search_s: float = Field(default=5.0, gt=0.0)
     """After so long it searches: towards the phone, if that is heard; otherwise it turns round where it is."""
@@ -29,17 +38,17 @@ class GuardSettings(BaseModel):
     """From this age of the picture on it becomes slower ..."""
     image_stop_s: float = Field(default=0.8, gt=0.0)
     """... until it stands."""
-    owner_m: float = Field(default=1.1, gt=0.0)
+    owner_m: float = Field(default=OWNER_M, gt=0.0)
     """To the middle of the owner: it comes no nearer."""
     pressed_m: float = Field(default=2.0, gt=0.0)
-    """Nearer than this it may go back to where it has not looked; nearer than `owner_m` it climbs as well."""
-    escape_climb: float = Field(default=1.5, ge=0.0)
+    """Nearer than this it may go back to where it has not looked; nearer than `owner_m` it climbs as well, until it is over them."""
+    escape_climb: float = Field(default=ESCAPE_CLIMB_M_S, ge=0.0)
     """[m/s]"""
-    owner_brake: float = Field(default=2.0, gt=0.0)
+    owner_brake: float = Field(default=OWNER_BRAKE_M_S2, gt=0.0)
     """[m/s²] with which it is taken to brake before the owner ..."""
     brake: float = Field(default=4.0, gt=0.0)
     """... and before what does not move."""
-    reaction_s: float = Field(default=0.35, ge=0.0)
+    reaction_s: float = Field(default=REACTION_S, ge=0.0)
     """From a setpoint to the motion, besides the age of the picture; measured."""
     solid_m: float = Field(default=0.6, gt=0.0)
     """From the vehicle's middle to that of a solid cell of the map: it reaches to 0.4 m, half a cell to 0.18 m."""

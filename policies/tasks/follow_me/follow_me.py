@@ -55,6 +55,7 @@ from policies.tasks.follow_me.owner_visibility import Sight
 from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS
 from policies.tasks.follow_me.settings import FollowSettings
 from policies.tasks.follow_me.task_cameras import Eyes
+from policies.tasks.follow_me.tracked.keep_off import keep_off
 from policies.tasks.follow_me.tracked.sight_model import make_tracked, sense
 from policies.tasks.follow_me.tracked.vector import TRACKED_ELEMENTS
 from policies.tasks.follow_me.world import FOLLOW_WORLD
@@ -272,4 +273,5 @@ def _rules(settings: FollowSettings, layout: Layout) -> Any:
     rules.has_privileged = int(bool(layout.privileged))
     rules.is_kept = int(settings.terrain == "kept")
     rules.decision_ticks = DECISION_TICKS
+    rules.keep_off = keep_off()
     return rules

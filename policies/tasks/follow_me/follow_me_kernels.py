@@ -39,6 +39,8 @@ from policies.tasks.follow_me.observe import REPORT_OLD_S, TRACKED, OwnerReport,
 from policies.tasks.follow_me.owner_visibility import Sight, lens_in, reach_from, see
 from policies.tasks.follow_me.privileged import write_privileged
 from policies.tasks.follow_me.reward import document_reward, follow_outcome, follow_reward, is_in_band
+from policies.tasks.follow_me.tracked.guarding import guarded
+from policies.tasks.follow_me.tracked.keep_off import KeepOff
 from policies.tasks.follow_me.tracked.sight_model import Tracked
 from policies.tasks.follow_me.tracked.vector import command_fractions, next_command, write_tracked
 from sim.advance import RigArrays
@@ -78,6 +80,7 @@ class Rules:
     has_privileged: int
     is_kept: int  # terrain
     decision_ticks: int
+    keep_off: KeepOff
 
 
 @wp.struct
@@ -214,6 +217,9 @@ def asked(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState
     if rules.vector != TRACKED:
         return action_command(action, q_ned_from_frd)
     command = next_command(state.tracked.commands[i], action, q_ned_from_frd)
+    if state.params[i].guard == 1.0:
+        own = own_state(rig, i, rules.has_estimator)
+        command = guarded(command, own, state.tracked.filters[i], state.image_ages_s[i], rules.keep_off)
     state.tracked.before[i] = state.tracked.commands[i]
     state.tracked.commands[i] = command
     return command

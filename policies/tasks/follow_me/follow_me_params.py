@@ -53,6 +53,7 @@ class FollowParams:
     image_loss: float
     image_freezes_per_min: float
     setpoint_lag_s: float
+    guard: float
     decision_limit: float
     near_m: float
     far_m: float
@@ -128,6 +129,9 @@ FOLLOW_PARAMS = (
     TaskParam("image_loss", 0.0, 0.0, 0.9, "1", "fraction of pictures that never come", "guess"),
     TaskParam("image_freezes_per_min", 0.0, 0.0, 20.0, "1/min", "times of 0.4 to 1.2 s without pictures", "guess"),
     TaskParam("setpoint_lag_s", 0.0, 0.0, 0.08, "s", "from policy to flight controller, in steps of 20 ms", "guess"),
+    TaskParam(
+        "guard", 0.0, 0.0, 1.0, "1", "1: the guard's rules of the owner bound what a policy without images asks", "guess"
+    ),
     TaskParam("decision_limit", 600.0, 1.0, 1e6, "1", "decisions of an episode; 600 are 60 s", "guess"),
     TaskParam("near_m", 1.0, 0.0, 20.0, "m", "to the owner's chest: nearer is too near", _EVT),
     TaskParam("far_m", 3.0, 0.0, 100.0, "m", "farther is not following", _EVT + " and " + _DOCUMENT),
@@ -181,7 +185,7 @@ DOCUMENTED: dict[str, float | Sampler] = {
 }
 # What a day outside may bring.
 IMPROVED: dict[str, float | Sampler] = {
-    "wind_m_s": Sampler(intervals=((0.0, 6.0),)),
+    "wind_m_s": Sampler(intervals=((0.0, 8.0),)),
     "wind_gust_m_s": Sampler(intervals=((0.0, 3.0),)),
     "sensor_noise": Sampler(intervals=((0.5, 1.5),)),
     "mass_scale": Sampler(intervals=((0.9, 1.15),)),
@@ -199,7 +203,7 @@ SEEN_BY_TRACKER: dict[str, float | Sampler] = {
     "bystanders": Sampler(mean=0.0, st_dev=0.8),
     "start_distance_min_m": 1.5,
     "start_distance_max_m": Sampler(intervals=((3.0, 5.0), (3.0, 8.0))),
-    "image_lag_s": Sampler(mean=0.05, st_dev=0.12),
+    "image_lag_s": Sampler(intervals=((0.0, 0.1), (0.0, 0.35))),
     "image_jitter_s": Sampler(mean=0.0, st_dev=0.05),
     "image_loss": Sampler(mean=0.0, st_dev=0.05),
     "image_freezes_per_min": Sampler(mean=0.0, st_dev=1.0),
@@ -209,6 +213,7 @@ SEEN_BY_TRACKER: dict[str, float | Sampler] = {
     "shutter_s": Sampler(mean=0.0, st_dev=0.012),
     "depth_max_m": Sampler(intervals=((0.0, 1.0), (0.0, 1.0), (3.0, 13.0))),
     "depth_holes": Sampler(mean=0.0, st_dev=0.12),
+    "guard": 1.0,
     "unseen_limit_s": 3.0,
     "view_width_deg": 30.0,
     "jerk_cost": 15.0,

@@ -1,20 +1,32 @@
 """The owner's level place and velocity from sights alone: one source for training and for flight.
 
 In: where each picture shows the owner, how well, and how old that is. Out: place and velocity of now with variances,
-and the newest innovation, which says that they turn before the velocity does. A Kalman filter of nearly constant
-velocity; the state stays at the time of the newest sight and is carried on when it is asked.
+and the newest innovation, which says that they turn before the velocity does. Two models of how they move, who goes on
+and who turns or stops, and how probable the second is: an interacting multiple model (Blom and Bar-Shalom 1988). The
+state stays at the time of the newest sight and is carried on when it is asked.
 """
 
 import warp as wp
 
+from policies.tasks.follow_me.tracked.motion_filter import (
+    Motion,
+    bounded_innov,
+    corrected,
+    likelihood,
+    mixed,
+    moved,
+)
+
 wp.set_module_options({"enable_backward": False})
 
-ACCEL_NSD2 = wp.constant(0.8)  # [m²/s³] of the owner's velocity; least error on people of the simulation
+STEADY_NSD2 = wp.constant(0.1)  # [m²/s³] of the velocity of who goes on,
+TURNING_NSD2 = wp.constant(2.0)  # and of who turns, stops or sets off
+TURNS_EVERY_S = wp.constant(3.0)
+TURNS_FOR_S = wp.constant(0.7)
 START_SPEED_STD = wp.constant(1.5)  # [m/s] of somebody new
 FORGOTTEN_S = wp.constant(3.0)  # after so long without a sight they are somebody new
 SLOWS_S = wp.constant(1.5)  # unseen, their velocity is believed less, with this time
 DOWN_GAIN = wp.constant(0.3)  # of each sight's height
-CALM_S = wp.constant(0.7)  # with this time a calm velocity follows
 ODD_STDS = wp.constant(3.0)  # an innovation of more counts as so much: it may be no sight of the owner
 ALONG_STD_M = wp.constant(0.03)  # of a sight with depth, and more with each metre; measured
 ALONG_STD_FRACTION = wp.constant(0.015)
@@ -27,12 +39,11 @@ ACROSS_STD_RAD = wp.constant(0.015)
 class OwnerFilter:
     """One row."""
 
-    pos_ned: wp.vec3  # [m] of the chest, at the newest sight
-    vel_ned: wp.vec2  # [m/s] level
-    calm_vel_ned: wp.vec2  # [m/s] the same, smooth and late
-    pos_var: wp.mat22  # [m²]
-    cross_var: wp.mat22  # [m²/s] of place and velocity
-    vel_var: wp.mat22  # [m²/s²]
+    steady: Motion  # by each model, at the newest sight
+    turning: Motion
+    turns: float  # [1] how probable the second is
+    both: Motion  # together
+    down: float  # [m] of the chest
     innov_ned: wp.vec2  # [m] of the newest sight
     age_s: float  # since that sight was taken
     is_known: int
@@ -46,31 +57,18 @@ def waited(f: OwnerFilter, dt_s: float) -> OwnerFilter:
 
 
 @wp.func
-def predicted(f: OwnerFilter, dt_s: float) -> OwnerFilter:
-    """The state carried on by so long."""
-    unit = wp.identity(n=2, dtype=float)
-    step = dt_s * f.vel_ned
-    f.pos_ned = f.pos_ned + wp.vec3(step[0], step[1], 0.0)
-    f.pos_var = f.pos_var + dt_s * (f.cross_var + wp.transpose(f.cross_var)) + dt_s * dt_s * f.vel_var
-    f.pos_var = f.pos_var + ACCEL_NSD2 * dt_s * dt_s * dt_s / 3.0 * unit
-    f.cross_var = f.cross_var + dt_s * f.vel_var + ACCEL_NSD2 * dt_s * dt_s / 2.0 * unit
-    f.vel_var = f.vel_var + ACCEL_NSD2 * dt_s * unit
-    return f
-
-
-@wp.func
-def even(m: wp.mat22) -> wp.mat22:
-    """The symmetric part: rounding errors of the other would grow."""
-    return 0.5 * (m + wp.transpose(m))
-
-
-@wp.func
 def begun(pos_ned: wp.vec3, obs_var: wp.mat22, age_s: float) -> OwnerFilter:
     """Of somebody new."""
+    m = Motion()
+    m.pos = wp.vec2(pos_ned[0], pos_ned[1])
+    m.pos_var = obs_var
+    m.vel_var = START_SPEED_STD * START_SPEED_STD * wp.identity(n=2, dtype=float)
     f = OwnerFilter()
-    f.pos_ned = pos_ned
-    f.pos_var = obs_var
-    f.vel_var = START_SPEED_STD * START_SPEED_STD * wp.identity(n=2, dtype=float)
+    f.steady = m
+    f.turning = m
+    f.both = m
+    f.turns = 0.5
+    f.down = pos_ned[2]
     f.age_s = age_s
     f.is_known = 1
     return f
@@ -96,22 +94,27 @@ def seen(f: OwnerFilter, pos_ned: wp.vec3, eye_ned: wp.vec3, has_depth: int, age
     dt_s = f.age_s - age_s
     if f.is_known == 0 or dt_s > FORGOTTEN_S:
         return begun(pos_ned, obs_var, age_s)
-    f = predicted(f, wp.max(dt_s, 0.0))
-    innov = wp.vec2(pos_ned[0] - f.pos_ned[0], pos_ned[1] - f.pos_ned[1])
-    innov_inv = wp.inverse(f.pos_var + obs_var)
-    stds = wp.sqrt(wp.max(wp.dot(innov, innov_inv * innov), 0.0))
-    innov = innov * wp.min(1.0, ODD_STDS / wp.max(stds, 1.0e-6))
-    pos_gain = f.pos_var * innov_inv
-    vel_gain = wp.transpose(f.cross_var) * innov_inv
-    pos_step = pos_gain * innov
-    down = DOWN_GAIN * (pos_ned[2] - f.pos_ned[2])
-    f.pos_ned = f.pos_ned + wp.vec3(pos_step[0], pos_step[1], down)
-    f.vel_ned = f.vel_ned + vel_gain * innov
-    f.calm_vel_ned = f.calm_vel_ned + wp.min(dt_s / CALM_S, 1.0) * (f.vel_ned - f.calm_vel_ned)
-    f.vel_var = even(f.vel_var - vel_gain * f.cross_var)
-    f.cross_var = f.cross_var - pos_gain * f.cross_var
-    f.pos_var = even(f.pos_var - pos_gain * f.pos_var)
-    f.innov_ned = innov
+    dt_s = wp.max(dt_s, 0.0)
+    setting_off, calming = 1.0 - wp.exp(-dt_s / TURNS_EVERY_S), 1.0 - wp.exp(-dt_s / TURNS_FOR_S)
+    turned = (1.0 - f.turns) * setting_off
+    still_turning = f.turns * (1.0 - calming)
+    turns = turned + still_turning
+    steady = mixed(f.steady, f.turning, f.turns * calming / wp.max(1.0 - turns, 1.0e-6))
+    turning = mixed(f.steady, f.turning, still_turning / wp.max(turns, 1.0e-6))
+    steady = moved(steady, dt_s, STEADY_NSD2)
+    turning = moved(turning, dt_s, TURNING_NSD2)
+    place = wp.vec2(pos_ned[0], pos_ned[1])
+    steady_var, turning_var = steady.pos_var + obs_var, turning.pos_var + obs_var
+    steady_innov = bounded_innov(place - steady.pos, turning_var, ODD_STDS)
+    turning_innov = bounded_innov(place - turning.pos, turning_var, ODD_STDS)
+    as_steady = (1.0 - turns) * likelihood(steady_innov, steady_var)
+    as_turning = turns * likelihood(turning_innov, turning_var)
+    f.turns = wp.clamp(as_turning / wp.max(as_steady + as_turning, 1.0e-20), 0.01, 0.99)
+    f.steady = corrected(steady, bounded_innov(steady_innov, steady_var, ODD_STDS), steady_var)
+    f.turning = corrected(turning, turning_innov, turning_var)
+    f.both = mixed(f.steady, f.turning, f.turns)
+    f.down = f.down + DOWN_GAIN * (pos_ned[2] - f.down)
+    f.innov_ned = steady_innov
     f.age_s = age_s
     return f
 
@@ -127,14 +130,14 @@ def place_now(f: OwnerFilter) -> wp.vec3:
     """[m] of the chest."""
     fresh_s = wp.min(f.age_s, 0.5)
     way_s = fresh_s + SLOWS_S * (1.0 - slowing(f.age_s))
-    step = way_s * f.vel_ned
-    return f.pos_ned + wp.vec3(step[0], step[1], 0.0)
+    place = f.both.pos + way_s * f.both.vel
+    return wp.vec3(place[0], place[1], f.down)
 
 
 @wp.func
 def velocity_now(f: OwnerFilter) -> wp.vec2:
     """How fast they are by now [m/s]."""
-    return slowing(f.age_s) * f.vel_ned
+    return slowing(f.age_s) * f.both.vel
 
 
 @wp.kernel(enable_backward=False)

@@ -29,7 +29,9 @@ wp.set_module_options({"enable_backward": False})
 
 SECTORS = 24  # round the vehicle, from its heading clockwise
 REACH_M = wp.constant(8.0)  # what is farther away is not told
-APPROACH = wp.constant(0.4)  # of the way to what an action says, a decision: some 0.2 s
+APPROACH = wp.constant(0.4)  # of the way to what an action says, a decision: some 0.2 s;
+CALM_APPROACH = wp.constant(0.15)  # to what is nearly the same, as far as noise reaches, some 0.6 s
+CALM_M_S = wp.constant(0.8)
 ACCEL_MAX_M_S2 = wp.constant(6.0)  # of the level velocity asked for
 _DT_S = wp.constant(DECISION_S)
 _SECTORS = wp.constant(SECTORS)
@@ -64,7 +66,8 @@ TRACKED_ELEMENTS = (
 def next_command(last: Command, action: wp.vec4, q_ned_from_frd: wp.quat) -> Command:
     """What is asked for after a decision: the last, and some of the way to what the action says."""
     said = action_command(action, q_ned_from_frd)
-    step = APPROACH * (said.vel_ned - last.vel_ned)
+    step = said.vel_ned - last.vel_ned
+    step = step * (CALM_APPROACH + (APPROACH - CALM_APPROACH) * wp.min(wp.length(step) / CALM_M_S, 1.0))
     longest = _DT_S * ACCEL_MAX_M_S2
     step = step * wp.min(1.0, longest / wp.max(wp.sqrt(step[0] * step[0] + step[1] * step[1]), 1.0e-6))
     out = Command()
@@ -96,7 +99,7 @@ def _write_owner(own: OwnState, f: OwnerFilter, out: wp.array2d(dtype=float), i:
     velocity = velocity_now(f)
     vel = level_from_ned(wp.vec3(velocity[0], velocity[1], 0.0), yaw)
     left = slowing(f.age_s)
-    calm = level_from_ned(wp.vec3(left * f.calm_vel_ned[0], left * f.calm_vel_ned[1], 0.0), yaw)
+    calm = level_from_ned(wp.vec3(left * f.steady.vel[0], left * f.steady.vel[1], 0.0), yaw)
     innov = level_from_ned(wp.vec3(f.innov_ned[0], f.innov_ned[1], 0.0), yaw)
     far_m = wp.max(wp.length(way), 1.0e-3)
     level_m = wp.max(wp.sqrt(way[0] * way[0] + way[1] * way[1]), 1.0e-3)
@@ -110,8 +113,8 @@ def _write_owner(own: OwnState, f: OwnerFilter, out: wp.array2d(dtype=float), i:
     out[i, at + 9] = wp.min(far_m / _POSITION_SCALE, _POSITION_MAX)
     out[i, at + 10] = way[1] / level_m
     out[i, at + 11] = way[0] / level_m
-    out[i, at + 12] = wp.min(wp.sqrt(wp.max(wp.trace(f.pos_var), 0.0)), 3.0)
-    out[i, at + 13] = wp.min(wp.sqrt(wp.max(wp.trace(f.vel_var), 0.0)), 3.0)
+    out[i, at + 12] = wp.min(wp.sqrt(wp.max(wp.trace(f.both.pos_var), 0.0)), 3.0)
+    out[i, at + 13] = wp.min(wp.sqrt(wp.max(wp.trace(f.both.vel_var), 0.0)), 3.0)
     out[i, at + 14] = wp.min(f.age_s / _AGE_SCALE, _AGE_MAX)
     out[i, at + 15] = 1.0
     own_vel = level_from_ned(own.vel_ned, yaw)
