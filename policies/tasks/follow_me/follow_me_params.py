@@ -70,6 +70,7 @@ class FollowParams:
     near_cost: float
     height_cost: float
     jerk_cost: float
+    jerk_max: float
     turn_cost: float
     blind_cost: float
     clearance_m: float
@@ -150,6 +151,7 @@ FOLLOW_PARAMS = (
     TaskParam("near_cost", 0.2, 0.0, 10.0, "1", "per decision and metre nearer than 1.3 times the near limit", "tuned"),
     TaskParam("height_cost", 0.02, 0.0, 10.0, "1", "per decision and metre off the best height, at most 3", "tuned"),
     TaskParam("jerk_cost", 0.01, 0.0, 1000.0, "1", "per decision for the squared change of the action", "tuned"),
+    TaskParam("jerk_max", 16.0, 0.0, 16.0, "1", "a squared change of more costs no more: a stop in need is one", "tuned"),
     TaskParam("turn_cost", 0.002, 0.0, 10.0, "1", "per decision for the squared yaw rate asked for", "tuned"),
     TaskParam(
         "blind_cost",
@@ -185,7 +187,7 @@ DOCUMENTED: dict[str, float | Sampler] = {
 }
 # What a day outside may bring.
 IMPROVED: dict[str, float | Sampler] = {
-    "wind_m_s": Sampler(intervals=((0.0, 8.0),)),
+    "wind_m_s": Sampler(intervals=((0.0, 6.0),)),
     "wind_gust_m_s": Sampler(intervals=((0.0, 3.0),)),
     "sensor_noise": Sampler(intervals=((0.5, 1.5),)),
     "mass_scale": Sampler(intervals=((0.9, 1.15),)),
@@ -196,6 +198,7 @@ IMPROVED: dict[str, float | Sampler] = {
 }
 # The same, and what `follow-me-tracked` may meet; its velocities shall be smooth, and going back is no sin.
 SEEN_BY_TRACKER: dict[str, float | Sampler] = {
+    "wind_m_s": Sampler(intervals=((0.0, 8.0),)),
     "owner_stop_share": Sampler(intervals=((0.1, 0.35),)),
     "owner_course_std_deg": Sampler(intervals=((40.0, 70.0), (40.0, 70.0), (60.0, 120.0))),
     "owner_hides_per_min": Sampler(mean=0.2, st_dev=1.5),
@@ -217,6 +220,7 @@ SEEN_BY_TRACKER: dict[str, float | Sampler] = {
     "unseen_limit_s": 3.0,
     "view_width_deg": 30.0,
     "jerk_cost": 15.0,
+    "jerk_max": 0.004,
     "turn_cost": 0.05,
     "blind_cost": 0.003,
     "near_cost": 0.3,

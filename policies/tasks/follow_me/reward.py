@@ -22,7 +22,6 @@ _RADIANS = wp.constant(math.pi / 180.0)
 _FAR_MAX_M = wp.constant(5.0)
 _HEIGHT_MAX_M = wp.constant(3.0)
 _NEAR_MARGIN = wp.constant(1.3)
-_JERK_MAX = wp.constant(0.004)  # a guard's stop costs no more than that
 
 
 @wp.func
@@ -73,7 +72,7 @@ def follow_reward(n: FollowParams, sight: Sight, outcome: int, action: wp.vec4, 
     height = sight.position_hfrd[2] - n.best_height_m  # the chest lies this much lower than it should
     reward -= n.height_cost * wp.min(wp.abs(height), _HEIGHT_MAX_M)
     change = action - last_action
-    reward -= n.jerk_cost * wp.min(wp.dot(change, change), _JERK_MAX)
+    reward -= n.jerk_cost * wp.min(wp.dot(change, change), n.jerk_max)
     reward -= n.turn_cost * action[3] * action[3]
     blind = blind_speed(action)
     reward -= n.blind_cost * blind * blind

@@ -38,6 +38,13 @@ def test_noise_is_filtered() -> None:
     assert vel == pytest.approx([1.0, 0.0], abs=0.35)
 
 
+def test_who_stops_is_noticed_sooner_than_noise_would_be() -> None:
+    owner = walked((3.0, 0.0), 40)
+    for k in range(41, 46):
+        owner.see(np.array([2.0 + 12.0, 0.0, -1.0]), pose(k), has_depth=True)
+    assert owner.now(4_500_000)[1][0] < 1.0
+
+
 def test_who_has_not_been_seen_for_long_is_believed_to_slow_down() -> None:
     owner = walked((2.0, 0.0), 40)
     _, soon = owner.now(4_300_000)

@@ -1,0 +1,94 @@
+"""The guard's rule of the owner: laws of how fast it may come nearer, and who obeys it stands in time."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from policies.tasks.follow_me.tracked.keep_off import (
+    OWNER_BRAKE_M_S2,
+    OWNER_M,
+    REACTION_S,
+    closing_max,
+    distance_then,
+    keep_off,
+    kept_off,
+    level_m,
+    sinking_max,
+)
+
+RULE = keep_off()
+_STOPS_M_S2 = 2.5  # how fast people are taken to stop
+_DT_S = 0.01
+
+
+def most(far_m: float, own: float = 0.0, leaving: float = 0.0, age_s: float = 0.0, over_m: float = 0.0) -> float:
+    """How fast it may close [m/s] with somebody ahead."""
+    return float(closing_max(RULE, wp.vec2(far_m, 0.0), wp.vec2(own, 0.0), wp.vec2(leaving, 0.0), age_s, over_m))
+
+
+def nearest_m(speed: float, age_s: float, start_m: float) -> float:
+    """How near it comes to somebody who walks away and then stops, of whom it knows what was so long ago.
+
+    The vehicle wants to go 3 m/s faster than they; what it may do it does after its reaction, and it brakes as well as
+    the rule takes it to.
+    """
+    late, answers = round(age_s / _DT_S), round(REACTION_S / _DT_S)
+    owner, own, velocities = [start_m], 0.0, [speed]
+    at, asked, gaps = 0.0, [0.0] * (answers + 1), []
+    for k in range(round(12.0 / _DT_S)):
+        slower = max(velocities[-1] - _STOPS_M_S2 * _DT_S, 0.0) if k > round(5.0 / _DT_S) else velocities[-1]
+        velocities.append(slower)
+        owner.append(owner[-1] + slower * _DT_S)
+        seen = max(len(owner) - 1 - late, 0)
+        place = owner[seen] + age_s * velocities[seen]  # carried on, as the filter does
+        asked.append(min(most(place - at, own, velocities[seen], age_s), speed + 3.0))
+        change = np.clip(asked[-1 - answers] - own, -OWNER_BRAKE_M_S2 * _DT_S, 4.0 * _DT_S)
+        own += float(change)
+        at += own * _DT_S
+        gaps.append(owner[-1] - at)
+    return min(gaps)
+
+
+@pytest.mark.parametrize("age_s", [0.0, 0.1, 0.2, 0.3])
+@pytest.mark.parametrize("speed", [1.0, 2.0, 4.0])
+def test_who_obeys_it_stands_in_time_behind_people_who_stop(speed: float, age_s: float) -> None:
+    assert nearest_m(speed, age_s, start_m=3.0) > OWNER_M - 0.15
+
+
+def test_too_near_it_gives_way_and_the_faster_the_nearer() -> None:
+    assert most(0.8) < 0.0
+    assert most(0.5) < most(0.8)
+
+
+def test_who_comes_is_given_way_to_and_who_goes_gives_room() -> None:
+    assert most(2.0, leaving=-1.0) < most(2.0) < most(2.0, leaving=2.0)
+
+
+def test_it_is_slower_the_older_the_picture() -> None:
+    closing = [most(3.0, own=2.0, leaving=2.0, age_s=age_s) for age_s in (0.0, 0.1, 0.2, 0.3)]
+    assert closing == sorted(closing, reverse=True)
+    assert closing[0] > closing[-1]
+
+
+def test_over_their_head_the_level_distance_does_not_count() -> None:
+    assert float(level_m(RULE, 0.0)) == pytest.approx(OWNER_M)
+    assert 0.0 < float(level_m(RULE, 1.0)) < OWNER_M
+    assert float(level_m(RULE, 1.5)) == 0.0
+    assert most(1.2, over_m=1.2) > most(1.2)
+
+
+def test_nearer_than_allowed_it_climbs_until_it_is_over_them() -> None:
+    assert float(sinking_max(RULE, 0.3, 0.5)) < -1.0
+    assert float(sinking_max(RULE, 1.45, 0.5)) == pytest.approx(0.0, abs=1e-6)
+    assert float(sinking_max(RULE, 0.3, 1.5)) > 10.0
+
+
+def test_what_it_takes_off_is_only_what_brings_it_nearer() -> None:
+    kept = kept_off(wp.vec2(2.0, 1.0), wp.vec2(3.0, 0.0), 0.5)
+    assert tuple(kept) == pytest.approx((0.5, 1.0))
+    assert tuple(kept_off(wp.vec2(-2.0, 1.0), wp.vec2(3.0, 0.0), 0.5)) == pytest.approx((-2.0, 1.0))
+
+
+def test_the_distance_then_is_less_by_what_both_do_meanwhile() -> None:
+    then_m = float(distance_then(wp.vec2(3.0, 0.0), wp.vec2(2.0, 0.0), wp.vec2(0.0, 0.0), 0.5))
+    assert then_m == pytest.approx(3.0 - 0.5 * 2.0 - 0.5 * _STOPS_M_S2 * 0.25)
