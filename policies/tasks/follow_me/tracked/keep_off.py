@@ -19,6 +19,7 @@ ESCAPE_CLIMB_M_S = 1.5  # nearer than allowed, until it is over their head
 _OVER_M = wp.constant(1.45)  # so far above their chest it is
 _OVER_GAIN = wp.constant(2.0)  # [1/s]
 SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
+_UNTOLD_S = wp.constant(0.8)  # who sets off is thought of for so long: from then on there are no pictures
 _STOPS_M_S2 = wp.constant(2.5)  # how fast a person stops, and sets off; guess
 _DOUBT_M_S = wp.constant(0.2)  # of the speed that the tracker says; guess
 _BACK_GAIN = wp.constant(3.0)  # [1/s]
@@ -57,7 +58,8 @@ def stopping_speed(room_m: float, delay_s: float, brake: float) -> float:
 @wp.func
 def come_m(delay_s: float) -> float:
     """How much nearer somebody comes who sets off now [m]."""
-    return 0.5 * _STOPS_M_S2 * delay_s * delay_s
+    untold_s = wp.min(delay_s, _UNTOLD_S)
+    return 0.5 * _STOPS_M_S2 * untold_s * untold_s
 
 
 @wp.func

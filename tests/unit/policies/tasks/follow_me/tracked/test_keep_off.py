@@ -55,6 +55,22 @@ def test_who_obeys_it_stands_in_time_behind_people_who_stop(speed: float, age_s:
     assert nearest_m(speed, age_s, start_m=3.0) > OWNER_M - 0.15
 
 
+def test_full_speed_at_somebody_who_stands_ends_before_them() -> None:
+    at, own, asked = -8.0, 0.0, [0.0] * round(REACTION_S / _DT_S)
+    for _ in range(1500):
+        asked.append(min(most(-at, own), 7.0))
+        own += float(np.clip(asked.pop(0) - own, -OWNER_BRAKE_M_S2 * _DT_S, 4.0 * _DT_S))
+        at += own * _DT_S
+        assert at < 0.15 - OWNER_M
+    assert at == pytest.approx(-OWNER_M, abs=0.2)
+
+
+def test_going_past_somebody_is_let_be() -> None:
+    past, way = wp.vec2(0.0, 3.0), wp.vec2(2.0, 0.0)
+    most_m_s = closing_max(RULE, way, past, wp.vec2(0.0, 0.0), 0.0, 0.0)
+    assert tuple(kept_off(past, way, most_m_s)) == pytest.approx((0.0, 3.0))
+
+
 def test_too_near_it_gives_way_and_the_faster_the_nearer() -> None:
     assert most(0.8) < 0.0
     assert most(0.5) < most(0.8)
