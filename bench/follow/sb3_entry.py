@@ -1,6 +1,6 @@
 """An entry of the leaderboard by somebody else's learner: PPO of Stable-Baselines3 on FollowMe, end to end from images.
 
-`python -m bench.follow.sb3_entry --steps 400000` trains and writes results/sb3-follow.zip; the class below flies it:
+`python -m bench.follow.sb3_entry --steps 131072` trains and writes results/sb3-follow.zip; the class below flies it:
 `honeyguide benchmark follow --policy bench.follow.sb3_entry:Sb3Follower`. Needs the extra `bench`.
 """
 
@@ -41,7 +41,7 @@ class Sb3Follower:
 
 
 def main(
-    steps: Annotated[int, typer.Option(min=1, help="Decisions of all environments together.")] = 400_000,
+    steps: Annotated[int, typer.Option(min=1, help="Decisions of all environments together.")] = 131_072,
     seed: Annotated[int, typer.Option(min=0, help="Of networks and worlds.")] = 1,
 ) -> None:
     envs = BatchVecEnv("FollowMe", ENVS, seed, terrain="kept", has_estimator=False)
