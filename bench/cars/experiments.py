@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from bench.cars.done_right import MEMORY, OTHERS, SPARSE
-from bench.cars.experiment import NEW_SPOTS, VALIDATION, Experiment, Judged
+from bench.cars.done_right import HILL, MEMORY, OTHERS, SPARSE
+from bench.cars.experiment import NEW_SPOTS, PARKING2_SPOTS, VALIDATION, Experiment, Judged
 from bench.cars.few_goals import FEW_GOALS, QUARTER_ANYWHERE, QUARTERS
 
 VARIANTS = ("A0", "A1", "A2", "A3", "A4")
@@ -80,11 +80,7 @@ PARKING2 = Experiment(
     "parking2",
     "Parking 2",
     "parking2",
-    judged=(
-        Judged("training spots", {"split": "train"}),
-        Judged("new spots, storey 1", {"split": "test", "storey": "1"}),
-        Judged("new spots, storey 2", {"split": "test", "storey": "2"}),
-    ),
+    judged=PARKING2_SPOTS,
     document="32.8 / 47.2 / 22.8 %, 4 to 6 days",
     target=0.97,
     limit_s=600.0,
@@ -138,11 +134,13 @@ turn to and fro for ever on one of three goals, they do so in each of its episod
 the quarters, the one that holds the start is bridged; in the others the car hits what stands on roads that it was
 never sent down. The worst of them is nearly bridged, too, once starts and blocks are others in each episode.
 Imitation of the planner (400 episodes on those goals) finds the three goals, too, beside PPO or by cloning alone. On
-new spots cloning alone parks least: beside more blocks it hits walls, which the others hardly do. Not
-tried: mirrored episodes (`mirrored=true`)."""
+new spots cloning alone parks least: beside more blocks it hits walls, which the others hardly do."""
 
 _DONE_RIGHT_REMARKS = """\
-No task was found here that novelty opens. Two were tried with RND, one seed each. A4 with 2 x 128 units, by the seed
+Where chance does not find the goal, novelty does: MountainCar's top, paid there alone, in a third of the steps of the
+recipe `gym`, all three rows with the same settings. PPO alone gets there later (97.7 % after 150,000 steps, one seed);
+a price of each step, as Gymnasium has it, drives PPO itself to what it has not tried. On the cars' own tasks no gain
+was found. Two were tried with RND, one seed each. A4 with 2 x 128 units, by the seed
 that comes to 0.2 % with PPO alone, came to 0.5 % with a strength of 0.1. Parking 2's one published spot, paid for
 parking there alone, came to 0 of 1,000 after 3 million steps, with a strength of 1 beside 2 of the task's reward."""
 
@@ -196,12 +194,18 @@ _DONE_RIGHT = Section(
     "What failed, or never really ran",
     "Curiosity, RND and SAC were tried and given up, no LSTM was ever built, the drone document's hyper-network was "
     "inert. Here each stands beside the same run without it, for as many steps.",
-    (*SPARSE, *MEMORY, *OTHERS),
+    (*SPARSE, *HILL, *MEMORY, *OTHERS),
     (
         Image(
             "sparse",
             "Parking 1 paid at the end only",
             {"PPO": "parking1-sparse"} | {n: f"parking1-sparse-{n.lower()}" for n in ("Curiosity", "RND", "GAIL")},
+            over="steps",
+        ),
+        Image(
+            "mountain-car-top",
+            "MountainCar-v0 paid at the top only",
+            {"PPO": "mountain-car-top"} | {n: f"mountain-car-top-{n.lower()}" for n in ("Curiosity", "RND")},
             over="steps",
         ),
         Image(
