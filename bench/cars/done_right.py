@@ -42,22 +42,18 @@ def _hill(name: str, title: str, task: str, document: str, signals: dict[str, An
     return Experiment(name, title, "gym", 3, judged=(Judged("new starts"),), document=document, changes=changes)
 
 
-_HILL_SIGNALS: dict[str, tuple[str, str, dict[str, Any]]] = {
-    "": (", PPO alone", "", {}),
-    "-curiosity": (
-        ", with curiosity (ICM)",
-        "(Park It Right: did not work)",
+_TOP = "MountainCarAtTop"
+HILL = (
+    _hill("mountain-car-top", "MountainCar paid at the top, PPO alone", _TOP, "", {}),
+    _hill(
+        "mountain-car-top-curiosity",
+        "the same, with curiosity (ICM)",
+        _TOP,
+        "",
         {"curiosity": _CURIOSITY | {"strength": 1.0, "network_settings": {"hidden_units": 64, "normalize": True}}},
     ),
-    "-rnd": (", with RND", "(Park It Right: did not work)", {"rnd": _RND | {"strength": 1.0}}),
-}
-HILL = tuple(
-    _hill(f"{name}{suffix}", f"{title}{beside}", task, document, signals)
-    for name, title, task in (
-        ("mountain-car", "MountainCar, -1 a step", "MountainCar"),
-        ("mountain-car-top", "MountainCar, 1 at the top", "MountainCarAtTop"),
-    )
-    for suffix, (beside, document, signals) in _HILL_SIGNALS.items()
+    _hill("mountain-car-top-rnd", "the same, with RND", _TOP, "", {"rnd": _RND | {"strength": 1.0}}),
+    _hill("mountain-car", "MountainCar as published: -1 a step, PPO alone", "MountainCar", "", {}),
 )
 
 
@@ -90,7 +86,6 @@ OTHERS = (
         document="its setting",
         changes={"behavior.reward_signals.extrinsic.gamma": 0.8, "environment_parameters.discount": 0.8},
     ),
-    Experiment("parking2-one", "Parking 2, one observation", "parking2", 3, judged=PARKING2_SPOTS, document=""),
     Experiment(
         "parking2-stack",
         "Parking 2, last three stacked",
