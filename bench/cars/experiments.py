@@ -139,8 +139,8 @@ new spots cloning alone parks least: beside more blocks it hits walls, which the
 _DONE_RIGHT_REMARKS = """\
 Where chance does not find the goal, novelty does: the top of Gymnasium's MountainCar, paid there alone, with settings
 that are the same but for the signal. PPO alone found it in one seed of three, late; given 150,000 steps that seed came
-to 97.7 %. Where each step costs 1, as published, PPO needs no novelty to find it: what it has tried is worse than it
-expected. Strength is 1 here, 0.01 in the rows of Parking 1, whose goal PPO finds by chance and novelty only delays.
+to 97.7 %. Where each step costs 1, as published, PPO needs no novelty to find it, probably because what it has tried
+is worse than it expected. Strength is 1 here, 0.01 in the rows of Parking 1, whose goal PPO finds by chance and novelty only delays.
 
 On the tasks of the documents no gain was found. Two more were tried with RND, one seed each. A4 with 2 x 128 units, by
 the seed that comes to 0.2 % with PPO alone, came to 0.5 % with a strength of 0.1. Parking 2's one published spot, paid
