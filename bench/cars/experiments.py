@@ -134,7 +134,9 @@ turn to and fro for ever on one of three goals, they do so in each of its episod
 the quarters, the one that holds the start is bridged; in the others the car hits what stands on roads that it was
 never sent down. The worst of them is nearly bridged, too, once starts and blocks are others in each episode.
 Imitation of the planner (400 episodes on those goals) finds the three goals, too, beside PPO or by cloning alone. On
-new spots cloning alone parks least: beside more blocks it hits walls, which the others hardly do."""
+new spots cloning alone parks least: beside more blocks it hits walls, which the others hardly do. Mirroring every
+other episode in training does not beat the document's 92 % on new spots: alone it parks on fewer than the same without
+it, and where starts and blocks are anywhere it changes nothing that three seeds could show."""
 
 _DONE_RIGHT_REMARKS = """\
 Where chance does not find the goal, novelty does: the top of Gymnasium's MountainCar, paid there alone, with settings
