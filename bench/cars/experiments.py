@@ -135,7 +135,7 @@ the quarters, the one that holds the start is bridged; in the others the car hit
 never sent down. The worst of them is nearly bridged, too, once starts and blocks are others in each episode.
 Imitation of the planner (400 episodes on those goals) finds the three goals, too, beside PPO or by cloning alone. On
 new spots cloning alone parks least: beside more blocks it hits walls, which the others hardly do. Mirroring every
-other episode in training does not beat the document's 92 % on new spots: alone it parks on no more than the same without
+other episode in training does not beat the document's 92 % on new spots: alone it parks on no more than without
 it, and where starts and blocks are anywhere it changes nothing that three seeds could show."""
 
 _DONE_RIGHT_REMARKS = """\
