@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from bench.cars.experiment import NEW_SPOTS, Experiment
+from bench.cars.experiment import NEW_SPOTS, PARKING2_SPOTS, Experiment, Judged
 
 _SPARSE: dict[str, Any] = {
     "environment_parameters.progress_per_m": 0.0,
@@ -26,6 +26,34 @@ SPARSE = (
     _sparse("parking1-sparse-curiosity", "sparse, with curiosity (ICM)", "did not work", {"curiosity": _CURIOSITY}),
     _sparse("parking1-sparse-rnd", "sparse, with RND", "did not work", {"rnd": _RND}),
     _sparse("parking1-sparse-gail", "sparse, with GAIL", "", {"gail": _GAIL}),
+)
+
+_HILL: dict[str, Any] = {
+    "env_settings.num_areas": 64,
+    "behavior.hyperparameters.num_epoch": 5,
+    "behavior.max_steps": 100_000,
+}
+
+
+def _hill(name: str, title: str, task: str, document: str, signals: dict[str, Any]) -> Experiment:
+    """Gymnasium's MountainCar with another signal beside the reward of the task."""
+    changes = _HILL | {"env_settings.env_path": f"bench.cars.sparse_tasks:{task}"}
+    changes |= {f"behavior.reward_signals.{signal}": block for signal, block in signals.items()}
+    return Experiment(name, title, "gym", 3, judged=(Judged("new starts"),), document=document, changes=changes)
+
+
+_TOP = "MountainCarAtTop"
+HILL = (
+    _hill("mountain-car-top", "MountainCar paid at the top, PPO alone", _TOP, "", {}),
+    _hill(
+        "mountain-car-top-curiosity",
+        "the same, with curiosity (ICM)",
+        _TOP,
+        "",
+        {"curiosity": _CURIOSITY | {"strength": 1.0, "network_settings": {"hidden_units": 64, "normalize": True}}},
+    ),
+    _hill("mountain-car-top-rnd", "the same, with RND", _TOP, "", {"rnd": _RND | {"strength": 1.0}}),
+    _hill("mountain-car", "MountainCar as published: -1 a step, PPO alone", "MountainCar", "", {}),
 )
 
 
@@ -57,6 +85,15 @@ OTHERS = (
         judged=(NEW_SPOTS,),
         document="its setting",
         changes={"behavior.reward_signals.extrinsic.gamma": 0.8, "environment_parameters.discount": 0.8},
+    ),
+    Experiment(
+        "parking2-stack",
+        "Parking 2, last three stacked",
+        "parking2",
+        3,
+        {"stack": 3},
+        judged=PARKING2_SPOTS,
+        document="stacks three; 32.8 / 47.2 / 22.8 %",
     ),
     Experiment(
         "parking1-sac", "SAC", "parking1-sac", 3, judged=(NEW_SPOTS,), document="unstable, abandoned after 20 h"

@@ -33,3 +33,8 @@ class Experiment:
 
 NEW_SPOTS = Judged("new spots", {"split": "test"})
 VALIDATION = Judged("validation spots", {"split": "validation"}, episodes=4000, chooses=True)
+PARKING2_SPOTS = (
+    Judged("training spots", {"split": "train"}),
+    Judged("new spots, storey 1", {"split": "test", "storey": "1"}),
+    Judged("new spots, storey 2", {"split": "test", "storey": "2"}),
+)

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from bench.cars.done_right import MEMORY, OTHERS, SPARSE
-from bench.cars.experiment import NEW_SPOTS, VALIDATION, Experiment, Judged
+from bench.cars.done_right import HILL, MEMORY, OTHERS, SPARSE
+from bench.cars.experiment import NEW_SPOTS, PARKING2_SPOTS, VALIDATION, Experiment, Judged
 from bench.cars.few_goals import FEW_GOALS, QUARTER_ANYWHERE, QUARTERS
 
 VARIANTS = ("A0", "A1", "A2", "A3", "A4")
@@ -80,11 +80,7 @@ PARKING2 = Experiment(
     "parking2",
     "Parking 2",
     "parking2",
-    judged=(
-        Judged("training spots", {"split": "train"}),
-        Judged("new spots, storey 1", {"split": "test", "storey": "1"}),
-        Judged("new spots, storey 2", {"split": "test", "storey": "2"}),
-    ),
+    judged=PARKING2_SPOTS,
     document="32.8 / 47.2 / 22.8 %, 4 to 6 days",
     target=0.97,
     limit_s=600.0,
@@ -138,13 +134,25 @@ turn to and fro for ever on one of three goals, they do so in each of its episod
 the quarters, the one that holds the start is bridged; in the others the car hits what stands on roads that it was
 never sent down. The worst of them is nearly bridged, too, once starts and blocks are others in each episode.
 Imitation of the planner (400 episodes on those goals) finds the three goals, too, beside PPO or by cloning alone. On
-new spots cloning alone parks least: beside more blocks it hits walls, which the others hardly do. Not
-tried: mirrored episodes (`mirrored=true`)."""
+new spots cloning alone parks least: beside more blocks it hits walls, which the others hardly do. Mirroring every
+other episode in training does not beat the document's 92 % on new spots: alone it parks on no more than without
+it, and where starts and blocks are anywhere it changes nothing that three seeds could show."""
 
 _DONE_RIGHT_REMARKS = """\
-No task was found here that novelty opens. Two were tried with RND, one seed each. A4 with 2 x 128 units, by the seed
-that comes to 0.2 % with PPO alone, came to 0.5 % with a strength of 0.1. Parking 2's one published spot, paid for
-parking there alone, came to 0 of 1,000 after 3 million steps, with a strength of 1 beside 2 of the task's reward."""
+Where chance does not find the goal, novelty does: the top of Gymnasium's MountainCar, paid there alone, with settings
+that are the same but for the signal. PPO alone found it in one seed of three, late; given 150,000 steps that seed came
+to 97.7 %. Where each step costs 1, as published, PPO needs no novelty to find it, probably because what it has tried
+is worse than it expected. Strength is 1 here, 0.01 in the rows of Parking 1, whose goal PPO finds by chance and which
+novelty only delays.
+
+Three stacked observations make no difference to Parking 2 that three seeds could show beside the row of the headline:
+the same recipe, both ended by its success target, this one trained on 495 cells. They are ours, with distances and
+speed in them; the document stacks directions.
+
+On the tasks of the documents no gain was found. Two more were tried with RND, one seed each. A4 with 2 x 128 units, by
+the seed that comes to 0.2 % with PPO alone, came to 0.5 % with a strength of 0.1. Parking 2's one published spot, paid
+for parking there alone, came to 0 of 1,000 after 3 million steps, with a strength of 1 beside 2 of what the task
+pays."""
 
 SECTIONS: tuple[Section, ...] = (
     Section(
@@ -196,12 +204,18 @@ _DONE_RIGHT = Section(
     "What failed, or never really ran",
     "Curiosity, RND and SAC were tried and given up, no LSTM was ever built, the drone document's hyper-network was "
     "inert. Here each stands beside the same run without it, for as many steps.",
-    (*SPARSE, *MEMORY, *OTHERS),
+    (*SPARSE, *HILL, *MEMORY, *OTHERS),
     (
         Image(
             "sparse",
             "Parking 1 paid at the end only",
             {"PPO": "parking1-sparse"} | {n: f"parking1-sparse-{n.lower()}" for n in ("Curiosity", "RND", "GAIL")},
+            over="steps",
+        ),
+        Image(
+            "mountain-car-top",
+            "MountainCar, paid at the top only",
+            {"PPO": "mountain-car-top"} | {n: f"mountain-car-top-{n.lower()}" for n in ("Curiosity", "RND")},
             over="steps",
         ),
         Image(

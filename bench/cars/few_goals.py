@@ -5,7 +5,7 @@ from typing import Any
 from bench.cars.experiment import Experiment, Judged
 
 # The document's own goals, start and blocks, on which every row of these is judged.
-_AS_PUBLISHED = {"starts": "published", "obstacles": "published"}
+_AS_PUBLISHED = {"starts": "published", "obstacles": "published", "mirrored": False}
 _ANYWHERE = {"starts": "anywhere", "obstacles": "anywhere"}
 _TWO_MILLION: dict[str, Any] = {"behavior.max_steps": 2_000_000, "behavior.success_target": None}
 _FEW_GOALS = (
@@ -29,10 +29,11 @@ def _few_goals(
     settings: dict[str, Any],
     changes: dict[str, Any] | None = None,
     recipe: str = "parking1",
+    seeds: int = 3,
 ) -> Experiment:
     """Parking 1 trained on the document's goals alone."""
     settings = {"goals": "published", **settings}
-    return Experiment(name, title, recipe, 3, settings, _TWO_MILLION | (changes or {}), _FEW_GOALS, document)
+    return Experiment(name, title, recipe, seeds, settings, _TWO_MILLION | (changes or {}), _FEW_GOALS, document)
 
 
 def _gail_goals(name: str, title: str, document: str, changes: dict[str, Any]) -> Experiment:
@@ -41,8 +42,8 @@ def _gail_goals(name: str, title: str, document: str, changes: dict[str, Any]) -
 
 
 FEW_GOALS = (
-    _few_goals("parking1-goal", "one goal", "13 % (PPO)", {"goals": "one"}),
-    _few_goals("parking1-goals", "three goals", "", {}),
+    _few_goals("parking1-goal", "one goal", "13 % (PPO)", {"goals": "one"}, seeds=5),
+    _few_goals("parking1-goals", "three goals", "", {}, seeds=5),
     _gail_goals("parking1-goals-gail", "three goals, PPO + GAIL", "92 % (PPO + GAIL)", {}),
     _gail_goals(
         "parking1-goals-gail-strong",
@@ -58,6 +59,13 @@ FEW_GOALS = (
         "",
         _ANYWHERE,
         {"behavior.hyperparameters.sharpening": 10},
+    ),
+    _few_goals("parking1-goals-mirrored", "three goals, every other episode mirrored", "", {"mirrored": True}),
+    _few_goals(
+        "parking1-goals-mirrored-both",
+        "the same, starts and blocks anywhere",
+        "",
+        _ANYWHERE | {"mirrored": True},
     ),
 )
 QUARTERS = tuple(
