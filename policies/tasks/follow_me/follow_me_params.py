@@ -131,7 +131,13 @@ FOLLOW_PARAMS = (
     TaskParam("image_freezes_per_min", 0.0, 0.0, 20.0, "1/min", "times of 0.4 to 1.2 s without pictures", "guess"),
     TaskParam("setpoint_lag_s", 0.0, 0.0, 0.08, "s", "from policy to flight controller, in steps of 20 ms", "guess"),
     TaskParam(
-        "guard", 0.0, 0.0, 1.0, "1", "1: the guard's rules of the owner bound what a policy without images asks", "guess"
+        "guard",
+        0.0,
+        0.0,
+        1.0,
+        "1",
+        "1: the guard's rules of the owner bound what a policy without images asks",
+        "guess",
     ),
     TaskParam("decision_limit", 600.0, 1.0, 1e6, "1", "decisions of an episode; 600 are 60 s", "guess"),
     TaskParam("near_m", 1.0, 0.0, 20.0, "m", "to the owner's chest: nearer is too near", _EVT),
@@ -151,7 +157,9 @@ FOLLOW_PARAMS = (
     TaskParam("near_cost", 0.2, 0.0, 10.0, "1", "per decision and metre nearer than 1.3 times the near limit", "tuned"),
     TaskParam("height_cost", 0.02, 0.0, 10.0, "1", "per decision and metre off the best height, at most 3", "tuned"),
     TaskParam("jerk_cost", 0.01, 0.0, 1000.0, "1", "per decision for the squared change of the action", "tuned"),
-    TaskParam("jerk_max", 16.0, 0.0, 16.0, "1", "a squared change of more costs no more: a stop in need is one", "tuned"),
+    TaskParam(
+        "jerk_max", 16.0, 0.0, 16.0, "1", "a squared change of more costs no more: a stop in need is one", "tuned"
+    ),
     TaskParam("turn_cost", 0.002, 0.0, 10.0, "1", "per decision for the squared yaw rate asked for", "tuned"),
     TaskParam(
         "blind_cost",

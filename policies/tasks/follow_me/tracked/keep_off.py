@@ -77,9 +77,7 @@ def level_m(k: KeepOff, over_m: float) -> float:
 
 
 @wp.func
-def closing_max(
-    k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, age_s: float, over_m: float
-) -> float:
+def closing_max(k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, age_s: float, over_m: float) -> float:
     """How fast it may come nearer to somebody [m/s]; negative: it has to give way.
 
     `way` leads to where they would be by now [m]; `own_vel` it has until it answers; `age_s` ago they were seen;
