@@ -41,7 +41,7 @@ class GuardSettings(BaseModel):
     owner_m: float = Field(default=OWNER_M, gt=0.0)
     """To the middle of the owner: it comes no nearer."""
     pressed_m: float = Field(default=2.0, gt=0.0)
-    """Nearer than this it may go back to where it has not looked; nearer than `owner_m` it climbs too, until over them."""
+    """Nearer than this it may go back to where it has not looked; nearer than `owner_m` it climbs too, until above."""
     escape_climb: float = Field(default=ESCAPE_CLIMB_M_S, ge=0.0)
     """[m/s]"""
     owner_brake: float = Field(default=OWNER_BRAKE_M_S2, gt=0.0)
