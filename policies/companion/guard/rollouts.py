@@ -21,7 +21,8 @@ _STEP_S, _STEPS = 0.05, 90  # coarser, it would pass over a trunk
 _NEARER_M = 0.1  # who is too near already may come so much nearer on the way out,
 _NEAREST_M = 0.1  # but by no more than this too near
 _STEADY = 0.3  # how much what was flown last counts beside what is wanted: not left, right and left again
-_SLOWER = 1.5  # how much a metre per second less counts besides: who goes slower and slower is left behind
+_SLOWER = 1.5  # how much a metre per second less counts besides: who goes slower and slower is left behind;
+_THAT_WAY = 0.5  # whoever turns by 60 degrees and more does not go there at all
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,9 @@ def clear_velocity(
     clear_steps = np.where(is_blocked.any(1), np.argmax(is_blocked, axis=1), _STEPS + 1)
     if person is not None:
         clear_steps[asked @ person.way > person.closing_max + 1e-6] = -1
-    slower = np.maximum(np.hypot(*wanted) - np.hypot(*asked.T), 0.0)
+    speed, wanted_speed = np.hypot(*asked.T), float(np.hypot(*wanted))
+    is_that_way = asked @ wanted > _THAT_WAY * speed * wanted_speed
+    slower = wanted_speed - np.where(is_that_way, np.minimum(speed, wanted_speed), 0.0)
     cost = np.hypot(*(asked - wanted).T) + _STEADY * np.hypot(*(asked - last).T) + _SLOWER * slower
     cost[0] = 0.0  # what is wanted, if it is clear
     if (clear_steps > _STEPS).any():

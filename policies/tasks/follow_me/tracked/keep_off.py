@@ -72,8 +72,8 @@ def distance_then(way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, delay_s: f
 @wp.func
 def level_m(k: KeepOff, over_m: float) -> float:
     """How near it may come on the level [m], so far above their chest: an ellipsoid about them, free of it above."""
-    share = wp.clamp(over_m / _OVER_M, 0.0, 1.0)
-    return k.owner_m * wp.sqrt(1.0 - share * share)
+    fraction = wp.clamp(over_m / _OVER_M, 0.0, 1.0)
+    return k.owner_m * wp.sqrt(1.0 - fraction * fraction)
 
 
 @wp.func

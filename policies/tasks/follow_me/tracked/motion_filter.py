@@ -68,15 +68,15 @@ def likelihood(innov: wp.vec2, innov_var: wp.mat22) -> float:
 
 
 @wp.func
-def mixed(a: Motion, b: Motion, share: float) -> Motion:
-    """Both together, of which the second has a share [1]: mean, and covariance with what they differ."""
+def mixed(a: Motion, b: Motion, fraction: float) -> Motion:
+    """Both together, of which the second is a fraction [1]: mean, and covariance with what they differ."""
     out = Motion()
-    keep = 1.0 - share
-    out.pos = keep * a.pos + share * b.pos
-    out.vel = keep * a.vel + share * b.vel
+    keep = 1.0 - fraction
+    out.pos = keep * a.pos + fraction * b.pos
+    out.vel = keep * a.vel + fraction * b.vel
     pos, vel = b.pos - a.pos, b.vel - a.vel
-    apart = keep * share
-    out.pos_var = keep * a.pos_var + share * b.pos_var + apart * wp.outer(pos, pos)
-    out.cross_var = keep * a.cross_var + share * b.cross_var + apart * wp.outer(pos, vel)
-    out.vel_var = keep * a.vel_var + share * b.vel_var + apart * wp.outer(vel, vel)
+    apart = keep * fraction
+    out.pos_var = keep * a.pos_var + fraction * b.pos_var + apart * wp.outer(pos, pos)
+    out.cross_var = keep * a.cross_var + fraction * b.cross_var + apart * wp.outer(pos, vel)
+    out.vel_var = keep * a.vel_var + fraction * b.vel_var + apart * wp.outer(vel, vel)
     return out
