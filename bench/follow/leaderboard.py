@@ -1,4 +1,4 @@
-"""`python -m bench.follow.leaderboard [FOLDER …]`: the tables of docs/results/leaderboard.md, from its rows.
+"""`python -m bench.follow.leaderboard [FOLDER]`: the tables of docs/results/leaderboard.md, from its rows.
 
 With FOLDER, its flights.json is entered first: a row in place of that of the same name.
 """

@@ -79,12 +79,18 @@ class Air:
         self.end.send(encode(name, 1, 1, 0, **fields))
 
 
-def test_a_policy_that_does_not_decide_hands_back_and_sends_no_number_that_is_none():
+def flown_air():
+    """Of a companion that was given control."""
     air = Air()
     air.run(1.0)
     air.mode = Mode.OFFBOARD
     air.run(1.0)
     assert air.companion.phase is Phase.FLYING
+    return air
+
+
+def test_a_policy_that_does_not_decide_hands_back_and_sends_no_number_that_is_none():
+    air = flown_air()
     air.pilot.is_lost, air.pilot.resets = True, 0
     reported = air.run(0.5)
     assert air.companion.trouble == NO_DECISION
@@ -102,11 +108,7 @@ def test_a_policy_that_does_not_decide_hands_back_and_sends_no_number_that_is_no
 
 
 def test_two_companions_at_once_hold_until_one_has_gone():
-    air = Air()
-    air.run(1.0)
-    air.mode = Mode.OFFBOARD
-    air.run(1.0)
-    assert air.companion.phase is Phase.FLYING
+    air = flown_air()
     air.end.send(encode("HEARTBEAT", 1, COMPONENT, 0, type=18, autopilot=8))
     reported = air.run(0.5)
     assert air.companion.phase is Phase.HANDING_BACK
