@@ -20,7 +20,7 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
 from policies.companion.vehicle_link import NEVER_US, Own
-from policies.tasks.follow_me.tracked.keep_off import closing_max, distance_then, keep_off, kept_off, sinking_max
+from policies.tasks.follow_me.tracked.keep_off import bounds, keep_off, kept_off
 
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
@@ -152,14 +152,12 @@ class Guard:
         if known is None:
             return level, None
         way = known[0][:2] - np.array(own.pos_ned[:2])
-        motion = wp.vec2(*way), wp.vec2(*own.vel_ned[:2]), wp.vec2(*known[1][:2])
-        then_m = distance_then(*motion, s.reaction_s + age_s)
-        self._is_too_near = then_m < s.owner_m
-        over_m = float(known[0][2]) - own.pos_ned[2]
-        self._sinking_max = sinking_max(self._keep_off, over_m, then_m)
-        most = closing_max(self._keep_off, *motion, age_s, over_m)
-        owner = Somebody(way / max(float(np.hypot(*way)), 1e-3), most, then_m < s.pressed_m)
-        kept = np.array(kept_off(wp.vec2(*level), motion[0], most))
+        own_vel, vel = wp.vec2(*own.vel_ned[:2]), wp.vec2(*known[1][:2])
+        bound = bounds(self._keep_off, wp.vec2(*way), own_vel, vel, age_s, float(known[0][2]) - own.pos_ned[2])
+        self._is_too_near = bound.then_m < s.owner_m
+        self._sinking_max = bound.sinking_max
+        owner = Somebody(way / max(float(np.hypot(*way)), 1e-3), bound.closing_max, bound.then_m < s.pressed_m)
+        kept = np.array(kept_off(wp.vec2(*level), wp.vec2(*way), bound.closing_max))
         self._count("near the owner", level, kept)
         return kept, owner
 

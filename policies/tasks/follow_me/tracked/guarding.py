@@ -7,15 +7,7 @@ guard does about trees it does by a map, which training has not.
 import warp as wp
 
 from policies.tasks.flight.own_state import Command, OwnState
-from policies.tasks.follow_me.tracked.keep_off import (
-    SLOW_S,
-    STOP_S,
-    KeepOff,
-    closing_max,
-    distance_then,
-    kept_off,
-    sinking_max,
-)
+from policies.tasks.follow_me.tracked.keep_off import SLOW_S, STOP_S, KeepOff, bounds, kept_off
 from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, place_now, velocity_now
 
 wp.set_module_options({"enable_backward": False})
@@ -31,12 +23,8 @@ def guarded(command: Command, own: OwnState, owner: OwnerFilter, image_age_s: fl
     scale = wp.clamp((_STOP_S - owner.age_s) / (_STOP_S - _SLOW_S), 0.0, 1.0)
     place = place_now(owner)
     way = wp.vec2(place[0] - own.pos_ned[0], place[1] - own.pos_ned[1])
-    own_vel, owner_vel = wp.vec2(own.vel_ned[0], own.vel_ned[1]), velocity_now(owner)
-    over_m = place[2] - own.pos_ned[2]
-    most = closing_max(k, way, own_vel, owner_vel, image_age_s, over_m)
-    level = kept_off(scale * wp.vec2(command.vel_ned[0], command.vel_ned[1]), way, most)
-    then_m = distance_then(way, own_vel, owner_vel, k.reaction_s + image_age_s)
-    sinking = sinking_max(k, over_m, then_m)
-    down = wp.min(scale * command.vel_ned[2], sinking)
-    command.vel_ned = wp.vec3(level[0], level[1], down)
+    own_vel = wp.vec2(own.vel_ned[0], own.vel_ned[1])
+    b = bounds(k, way, own_vel, velocity_now(owner), image_age_s, place[2] - own.pos_ned[2])
+    level = kept_off(scale * wp.vec2(command.vel_ned[0], command.vel_ned[1]), way, b.closing_max)
+    command.vel_ned = wp.vec3(level[0], level[1], wp.min(scale * command.vel_ned[2], b.sinking_max))
     return command

@@ -112,3 +112,22 @@ def sinking_max(k: KeepOff, over_m: float, then_m: float) -> float:
     if then_m < k.owner_m:
         return wp.max(_OVER_GAIN * (over_m - _OVER_M), -k.escape_climb)
     return 100.0
+
+
+@wp.struct
+class Bounds:
+    """What may be flown near somebody."""
+
+    closing_max: float  # [m/s] towards them
+    then_m: float  # how far away they are when the vehicle answers
+    sinking_max: float  # [m/s]
+
+
+@wp.func
+def bounds(k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, age_s: float, over_m: float) -> Bounds:
+    """All of the rule, of who was seen so long ago; as `closing_max` is asked."""
+    b = Bounds()
+    b.closing_max = closing_max(k, way, own_vel, other_vel, age_s, over_m)
+    b.then_m = distance_then(way, own_vel, other_vel, k.reaction_s + age_s)
+    b.sinking_max = sinking_max(k, over_m, b.then_m)
+    return b
