@@ -39,6 +39,7 @@ SCRIPTS = {
     "camera": "bench.flying.camera",
     "film": "bench.flying.film",
     "startup": "bench.flying.startup",
+    "gpu": "bench.flying.gpu",
 }
 """Modules of the benchmarks by name, in the order of the table."""
 RESULTS = Path(__file__).parent / "results.json"

@@ -1,4 +1,7 @@
-"""The start of Warp, on the first call: without its greeting, and wherever its kernel cache may be.
+"""The start of Warp, on the first call: on the CPU, without its greeting, and wherever its kernel cache may be.
+
+Warp alone would take a GPU by default where there is one, and a flight is a vehicle of the CPU there too: who wants a
+GPU names it (`Rig(device="cuda")`, `--torch-device cuda`), and from then on `device=` of Warp's own calls.
 
 Importing kernels starts nothing. Whoever makes the first arrays (a rig, a world, a task, an estimator) calls
 `start_warp` before; in a process that has been started already it costs nothing.
@@ -54,6 +57,7 @@ def _init_warp() -> None:
     """Initialises Warp; where its cache cannot be written, kernels are compiled for this process alone."""
     try:
         wp.init()
+        wp.set_device("cpu")
         folder = wp.config.kernel_cache_dir
         if os.access(folder, os.W_OK):
             return
@@ -63,4 +67,5 @@ def _init_warp() -> None:
     atexit.register(shutil.rmtree, own, ignore_errors=True)
     wp.config.kernel_cache_dir = own
     wp.init()
+    wp.set_device("cpu")
     os.write(2, f"the kernel cache {folder} cannot be written: kernels are compiled anew\n".encode())

@@ -21,12 +21,13 @@ HEIGHT_M = 10.0
 _SEED_COUNT = 128  # vehicles flown from power-on; larger fleets are copies with noise of their own
 
 
-def hovering(vehicle_count: int, *, has_estimator: bool = True, threads: int = 1) -> Rig:
+def hovering(vehicle_count: int, *, has_estimator: bool = True, threads: int = 1, device: str = "cpu") -> Rig:
     """X500s 10 m over home in 5 m/s of turbulent wind with gusts, default noise, the default world below."""
-    rig = _rig(vehicle_count, has_estimator, threads)
+    rig = _rig(vehicle_count, has_estimator, threads, device)
     rows = np.arange(vehicle_count)
-    sources, seeds = (wp.array(values, dtype=int) for values in (rows % _SEED_COUNT, rows + 1))
-    RowRestore(rig, _hovers(has_estimator), sources, wp.full(vehicle_count, True, dtype=wp.bool), seeds).launch()
+    sources, seeds = (wp.array(values, dtype=int, device=device) for values in (rows % _SEED_COUNT, rows + 1))
+    everyone = wp.full(vehicle_count, True, dtype=wp.bool, device=device)
+    RowRestore(rig, _hovers(has_estimator, device), sources, everyone, seeds).launch()
     rig.advance(250)
     check(rig, has_estimator=has_estimator)
     return rig
@@ -61,23 +62,24 @@ def _leaves(rows: np.ndarray[Any, Any]) -> list[np.ndarray[Any, Any]]:
     return [leaf for name in rows.dtype.names for leaf in _leaves(rows[name])]
 
 
-def _rig(vehicle_count: int, has_estimator: bool, threads: int) -> Rig:
+def _rig(vehicle_count: int, has_estimator: bool, threads: int, device: str) -> Rig:
     rig = Rig(
         load_airframe("x500"),
-        build_world(),
+        build_world(device=device),
         sensor_model(home=DEFAULT_HOME),
         wind_model(5.0, 270.0, 1.0, 1.5),
         home=DEFAULT_HOME,
         vehicle_count=vehicle_count,
         has_estimator=has_estimator,
         threads=threads,
+        device=device,
     )
     rig.load_parameters(parameter_table())
     return rig
 
 
 @cache
-def _hovers(has_estimator: bool) -> Rig:
-    rig = _rig(_SEED_COUNT, has_estimator, 1)
+def _hovers(has_estimator: bool, device: str) -> Rig:
+    rig = _rig(_SEED_COUNT, has_estimator, 1, device)
     fly_to_hover(rig, [((0.0, 0.0, -HEIGHT_M), 0.0)] * _SEED_COUNT)
     return rig

@@ -22,6 +22,8 @@ _NEARER_M = 0.1  # who is too near already may come so much nearer on the way ou
 _NEAREST_M = 0.1  # but by no more than this too near
 _STEADY = 0.3  # how much what was flown last counts beside what is wanted: not left, right and left again
 _SLOWER = 1.5  # how much a metre per second less counts besides: who goes slower and slower is left behind;
+_GRAZING = 4.0  # [1/s] how much a metre nearer counts than it should keep off besides, where it may:
+_SLACK_M = 0.25  # so much, since the map, and how a vehicle answers, are known as well as that
 _THAT_WAY = 0.5  # whoever turns by 60 degrees and more does not go there at all
 
 
@@ -40,7 +42,7 @@ class Somebody:
 def clear_velocity(
     wanted: Floats, last: Floats, own: Own, around: LocalMap, s: GuardSettings, person: Somebody | None = None
 ) -> Floats:
-    """The level velocity nearest to the wanted one [m/s] whose rollout is clear; if none is, the longest clear one.
+    """The level velocity nearest to the wanted one [m/s] whose rollout is clear; if none is, the one farthest off.
 
     Args:
         wanted: north and east [m/s].
@@ -59,18 +61,19 @@ def clear_velocity(
     if person is not None and person.is_pressing:
         may_be_unseen |= asked @ person.way < 0.0
     is_blocked = (near_m < _room_m(here_m, s.solid_m)) | ~(is_seen | may_be_unseen[:, None])
-    clear_steps = np.where(is_blocked.any(1), np.argmax(is_blocked, axis=1), _STEPS + 1)
-    if person is not None:
-        clear_steps[asked @ person.way > person.closing_max + 1e-6] = -1
+    is_clear = ~is_blocked.any(1)
+    answered = 1 + round(s.reaction_s / _STEP_S)
+    least_m = np.where(is_seen | may_be_unseen[:, None], near_m, 0.0)[:, answered:].min(1)
+    is_allowed = np.ones(len(asked), bool) if person is None else asked @ person.way <= person.closing_max + 1e-6
     speed, wanted_speed = np.hypot(*asked.T), float(np.hypot(*wanted))
     is_that_way = asked @ wanted > _THAT_WAY * speed * wanted_speed
     slower = wanted_speed - np.where(is_that_way, np.minimum(speed, wanted_speed), 0.0)
     cost = np.hypot(*(asked - wanted).T) + _STEADY * np.hypot(*(asked - last).T) + _SLOWER * slower
     cost[0] = 0.0  # what is wanted, if it is clear
-    if (clear_steps > _STEPS).any():
-        cost[clear_steps <= _STEPS] = np.inf
-        return np.asarray(asked[int(np.argmin(cost))])
-    return np.asarray(asked[int(np.argmax(clear_steps - 1e-3 * np.hypot(asked[:, 0], asked[:, 1])))])
+    cost += _GRAZING * np.maximum(s.solid_m + _SLACK_M - least_m, 0.0)
+    if (is_clear & is_allowed).any():
+        return np.asarray(asked[int(np.argmin(np.where(is_clear & is_allowed, cost, np.inf)))])
+    return np.asarray(asked[int(np.argmax(np.where(is_allowed, least_m - 1e-3 * speed, -np.inf)))])
 
 
 def _room_m(here_m: float, solid_m: float) -> float:

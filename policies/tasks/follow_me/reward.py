@@ -61,6 +61,15 @@ def blind_speed(action: wp.vec4) -> float:
 
 
 @wp.func
+def jerk(change: wp.vec4, square_max: float) -> float:
+    """The squared change of an action; what is more than so much counts by its size only: Huber's loss."""
+    square = wp.dot(change, change)
+    if square <= square_max:
+        return square
+    return 2.0 * wp.sqrt(square_max * square) - square_max
+
+
+@wp.func
 def follow_reward(n: FollowParams, sight: Sight, outcome: int, action: wp.vec4, last_action: wp.vec4) -> float:
     """Ours, of one decision."""
     distance = sight.distance_m
@@ -71,8 +80,7 @@ def follow_reward(n: FollowParams, sight: Sight, outcome: int, action: wp.vec4, 
     reward -= n.near_cost * wp.max(_NEAR_MARGIN * n.near_m - distance, 0.0)
     height = sight.position_hfrd[2] - n.best_height_m  # the chest lies this much lower than it should
     reward -= n.height_cost * wp.min(wp.abs(height), _HEIGHT_MAX_M)
-    change = action - last_action
-    reward -= n.jerk_cost * wp.min(wp.dot(change, change), n.jerk_max)
+    reward -= n.jerk_cost * jerk(action - last_action, n.jerk_max)
     reward -= n.turn_cost * action[3] * action[3]
     blind = blind_speed(action)
     reward -= n.blind_cost * blind * blind
