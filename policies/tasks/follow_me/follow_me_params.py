@@ -158,7 +158,13 @@ FOLLOW_PARAMS = (
     TaskParam("height_cost", 0.02, 0.0, 10.0, "1", "per decision and metre off the best height, at most 3", "tuned"),
     TaskParam("jerk_cost", 0.01, 0.0, 1000.0, "1", "per decision for the squared change of the action", "tuned"),
     TaskParam(
-        "jerk_max", 16.0, 0.0, 16.0, "1", "a squared change of more costs by its size only: a stop in need is one", "tuned"
+        "jerk_max",
+        16.0,
+        0.0,
+        16.0,
+        "1",
+        "what a squared change is more counts by its root only: a stop in need",
+        "tuned",
     ),
     TaskParam("turn_cost", 0.002, 0.0, 10.0, "1", "per decision for the squared yaw rate asked for", "tuned"),
     TaskParam(
