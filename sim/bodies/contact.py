@@ -14,6 +14,7 @@ from common.airframes.multirotor import MultirotorAirframe
 from common.geodesy import GRAVITY_M_S2
 from common.kernels import vec8
 from sim.world.neighbours import neighbour_touched
+from sim.world.solids import Solids, solids_gap, solids_hit, solids_leg
 from sim.world.world import World, ground_height, ground_normal_ned, obstacle_contact
 
 wp.set_module_options({"enable_backward": False})
@@ -60,6 +61,8 @@ class Surroundings:
     obstacle_vel_ned: wp.vec3  # [m/s] of another vehicle; all else stands as far as contact goes
     obstacle_shift_ned: wp.vec3  # [m] how far it has gone since it was looked up
     obstacle_rigidity: float  # fraction of a rigid obstacle's push: less where the other hull yields too
+    solids: Solids  # of the world, that legs are held against
+    is_near_solid: int
 
 
 @wp.struct
@@ -105,6 +108,24 @@ def look_around(world: World, model: ContactModel, pos_ned: wp.vec3) -> Surround
             stiffness_n_m = world.neighbours.rows[other].stiffness_n_m
             around.obstacle_vel_ned = world.neighbours.rows[other].vel_ned
             around.obstacle_rigidity = stiffness_n_m / (stiffness_n_m + 4.0 * model.normal_n_m)  # springs in series
+    if world.solids.count > 0:
+        around.solids = world.solids
+        reach_m = model.reach_m + _OBSTACLE_MARGIN_M
+        if solids_gap(world.solids, pos_ned, reach_m)[3] < reach_m:
+            around.is_near_solid = 1
+    return around
+
+
+@wp.func
+def over_solids(model: ContactModel, around: Surroundings) -> Surroundings:
+    """The surroundings of a vehicle that takes what is straight below itself for the plane of its ground."""
+    if around.solids.count > 0:
+        reach_m = _NEAR_FACTOR * model.reach_m + _OBSTACLE_MARGIN_M
+        hit = solids_hit(around.solids, around.origin_ned, wp.vec3(0.0, 0.0, 1.0), reach_m)
+        if hit.face >= 0 and hit.t < around.height_agl_m:
+            around.is_near_ground = 1
+            around.height_agl_m = hit.t
+            around.normal_ned = hit.normal_ned
     return around
 
 
@@ -144,7 +165,7 @@ def ground_contact(
     foot_slip: FootSlip,
     dt: float,
 ) -> ContactForce:
-    """Forces of the ground on feet and rotor tips.
+    """Forces of ground and solids on feet and rotor tips: of each, what it is deeper in.
 
     A normal spring and damper that never pull, and friction within Coulomb's cone.
     """
@@ -154,7 +175,13 @@ def ground_contact(
     height = wp.dot(normal, pos_ned - ground_ned)
     for point in range(model.point_count):
         arm_frd = contact_point_frd(model, point)
-        depth = -height - wp.dot(normal, r_ned_from_frd * arm_frd)
+        depth = -height - wp.dot(around.normal_ned, r_ned_from_frd * arm_frd)
+        if around.is_near_solid == 1:
+            normal = around.normal_ned
+            leg = solids_leg(around.solids, pos_ned, r_ned_from_frd * arm_frd)
+            if leg[3] > depth:
+                depth = leg[3]
+                normal = wp.vec3(leg[0], leg[1], leg[2])
         if depth > 0.0:
             point_vel_ned = vel_ned + r_ned_from_frd * wp.cross(omega_frd, arm_frd)
             normal_speed = wp.dot(normal, point_vel_ned)
