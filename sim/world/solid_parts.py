@@ -104,7 +104,13 @@ def _wall(item: WallSolid, terrain: TerrainMap, k: int) -> SolidPart:
     count = len(stretches)
     all_faces = np.concatenate([faces + 24 * i for i in range(count)])
     return _part(
-        f"wall{k}", np.concatenate(stretches), all_faces, item.colour, np.tile(uv, (count, 1)), item.texture, ("walls", k)
+        f"wall{k}",
+        np.concatenate(stretches),
+        all_faces,
+        item.colour,
+        np.tile(uv, (count, 1)),
+        item.texture,
+        ("walls", k),
     )
 
 
@@ -180,6 +186,4 @@ def _part(
     loc: tuple[int | str, ...],
 ) -> SolidPart:
     image = None if texture is None else read_image(texture, (*loc, "texture"))
-    return SolidPart(
-        name, vertices.astype(np.float32), faces, rgb_of(colour), None if image is None else uv, image
-    )
+    return SolidPart(name, vertices.astype(np.float32), faces, rgb_of(colour), None if image is None else uv, image)

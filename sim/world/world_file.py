@@ -20,7 +20,9 @@ Heading = Annotated[FiniteFloat, Field(ge=-360.0, le=360.0)]
 
 def _position(numbers: tuple[float, ...]) -> tuple[float, ...]:
     if len(numbers) not in (2, 3):
-        raise ValueError(f"must be north, east and down [m], or north and east on the ground, not {len(numbers)} numbers")
+        raise ValueError(
+            f"must be north, east and down [m], or north and east on the ground, not {len(numbers)} numbers"
+        )
     return numbers
 
 

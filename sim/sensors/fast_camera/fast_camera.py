@@ -21,9 +21,12 @@ from sim.sensors.fast_camera.light import STRIPS, light_corners, light_strips, p
 from sim.sensors.fast_camera.optics import Optics, expose
 from sim.sensors.fast_camera.prepare import prepare_views
 from sim.sensors.fast_camera.rows import Outputs, draw_rows
+from sim.sensors.fast_camera.solid_rows import draw_solids
 from sim.sensors.fast_camera.solids import Sights, Solid
+from sim.sensors.solid_paint import make_paint
 from sim.world.clothes import Clothes, usual_clothes
 from sim.world.people import Person
+from sim.world.solids import SolidsMap
 from sim.world.trees import CROWN_RADIUS_FRACTION
 from sim.world.world import World, WorldConfig, WorldMap
 
@@ -42,6 +45,10 @@ class Worlds(Protocol):
     @property
     def config(self) -> WorldConfig:
         """Of all of them."""
+
+    @property
+    def solids(self) -> SolidsMap:
+        """Of a world file, the same in all of them."""
 
     @property
     def kernels(self) -> Any:
@@ -71,7 +78,7 @@ class QuickCamera:
         optics: array of `sim.sensors.fast_camera.optics.Optics`, likewise; shape (0,) without optics.
         rgb: uint8, (count, height, width, 3).
         depth_m: float32, (count, height, width), along the optical axis; `sim.sensors.camera.SKY_DEPTH_M` for the sky.
-        kind: uint8, (count, height, width): SKY, GROUND, TRUNK, CROWN, WALL, PERSON, VEHICLE of `sim.sensors.ray`. From
+        kind: uint8, (count, height, width): SKY, GROUND, TRUNK, CROWN, WALL, PERSON, VEHICLE, SOLID of `sim.sensors.ray`. From
             inside a tree or person all pixels are that, at depth 0.
         i_world: array of int, shape (count,).
     """
@@ -126,6 +133,10 @@ class QuickCamera:
             (lay_columns, (columns.room,), [ground, views, chosen, columns]),
             (draw_rows, (height,), drawn),
         ]
+        if worlds.solids.parts:
+            self._paint = make_paint(worlds.solids, device)
+            seen_solids = [self._worlds, self.i_world, self._paint, paints, views, chosen, range_m, outputs]
+            passes.append((draw_solids, (height,), seen_solids))
         if has_optics:
             passes.append((expose, (height,), [self.lenses, chosen, self.optics, size, *images]))
         self._workers = Workers(count, threads)
