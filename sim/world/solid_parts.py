@@ -28,6 +28,7 @@ Faces = NDArray[np.int32]
 
 _ROUND_M = 5.0e-4  # how far a cylinder's sides may be from the round one
 _SIDES = (12, 720)  # at least and at most
+_STEP_M = 0.1  # along a wall, at which the ground is looked up
 _FOOT_M = 0.5  # how far walls go under the ground
 _PAD_RGB = (84, 84, 80)
 
@@ -94,7 +95,7 @@ def _wall(item: WallSolid, terrain: TerrainMap, k: int) -> SolidPart:
     for start, end in zip(points[:-1], points[1:], strict=True):
         along = end - start
         length = float(np.hypot(*along))
-        line = start + np.linspace(0.0, 1.0, max(2, ceil(length)))[:, None] * along
+        line = start + np.linspace(0.0, 1.0, max(2, ceil(length / _STEP_M)))[:, None] * along
         ground = terrain.height(line[:, 0], line[:, 1])
         low, high = float(ground.min()) - _FOOT_M, float(ground.max()) + item.height_m
         vertices, _, _ = _cuboid((length + item.thickness_m, item.thickness_m, high - low))

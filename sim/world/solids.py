@@ -24,6 +24,8 @@ wp.set_module_options({"enable_backward": False})
 
 FLOOR = wp.constant(0.5)  # cosine of the slope up to which a surface is stood on, and no obstacle: 60 deg
 _FAR_DOWN_M = wp.constant(1.0e4)
+_NEAR_M = wp.constant(1.0e-4)  # nearer, what is left of the difference of two positions is rounding
+_TINY = wp.constant(1.0e-20)
 
 
 @wp.struct
@@ -84,19 +86,71 @@ def solids_gap(solids: Solids, pos_ned: wp.vec3, most_m: float) -> wp.vec4:
         off = pos_ned - wp.mesh_eval_position(solids.mesh, query.face, query.u, query.v)
         distance = wp.length(off)
         normal = wp.mesh_eval_face_normal(solids.mesh, query.face)
-        if distance > 1.0e-4:  # nearer, what is left of the difference is rounding
+        if distance > _NEAR_M:
             normal = off / distance
         gap = wp.vec4(normal[0], normal[1], normal[2], distance)
     return gap
 
 
 @wp.func
+def closest_on_triangle(p: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.vec3:
+    """The point of a triangle that is nearest to another point (C. Ericson, Real-Time Collision Detection, 5.1.5)."""
+    ab = b - a
+    ac = c - a
+    d1 = wp.dot(ab, p - a)
+    d2 = wp.dot(ac, p - a)
+    if d1 <= 0.0 and d2 <= 0.0:
+        return a
+    d3 = wp.dot(ab, p - b)
+    d4 = wp.dot(ac, p - b)
+    if d3 >= 0.0 and d4 <= d3:
+        return b
+    vc = d1 * d4 - d3 * d2
+    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        return a + (d1 / wp.max(d1 - d3, _TINY)) * ab
+    d5 = wp.dot(ab, p - c)
+    d6 = wp.dot(ac, p - c)
+    if d6 >= 0.0 and d5 <= d6:
+        return c
+    vb = d5 * d2 - d1 * d6
+    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        return a + (d2 / wp.max(d2 - d6, _TINY)) * ac
+    va = d3 * d6 - d5 * d4
+    if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        return b + ((d4 - d3) / wp.max((d4 - d3) + (d5 - d6), _TINY)) * (c - b)
+    scale = 1.0 / wp.max(va + vb + vc, _TINY)
+    return a + (vb * scale) * ab + (vc * scale) * ac
+
+
+@wp.func
 def solids_contact(solids: Solids, pos_ned: wp.vec3, radius: float) -> wp.vec4:
-    """Contact of a sphere with the nearest surface, unless that is a floor below it: push-out normal, penetration."""
-    gap = solids_gap(solids, pos_ned, radius)
-    if gap[3] >= radius or -gap[2] > FLOOR:
-        return wp.vec4(0.0, 0.0, 0.0, 0.0)
-    return wp.vec4(gap[0], gap[1], gap[2], radius - gap[3])
+    """Deepest contact of a sphere with a surface that is no floor below it: push-out normal, penetration; 0 for none.
+
+    A floor is what slopes by less than `FLOOR` says, and an edge that lies so far below. Where one is the nearest, what
+    else is near is looked through.
+    """
+    contact = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    if solids_gap(solids, pos_ned, radius)[3] >= radius:
+        return contact
+    mesh = wp.mesh_get(solids.mesh)
+    reach = wp.vec3(radius, radius, radius)
+    query = wp.mesh_query_aabb(solids.mesh, pos_ned - reach, pos_ned + reach)
+    face = int(0)
+    while wp.mesh_query_aabb_next(query, face):
+        a = mesh.points[mesh.indices[3 * face]]
+        b = mesh.points[mesh.indices[3 * face + 1]]
+        c = mesh.points[mesh.indices[3 * face + 2]]
+        normal = wp.normalize(wp.cross(b - a, c - a))
+        if wp.dot(normal, pos_ned - a) < 0.0:
+            normal = -normal
+        off = pos_ned - closest_on_triangle(pos_ned, a, b, c)
+        distance = wp.length(off)
+        if radius - distance > contact[3] and -normal[2] <= FLOOR:
+            if distance > _NEAR_M:
+                normal = off / distance
+            if -normal[2] <= FLOOR:
+                contact = wp.vec4(normal[0], normal[1], normal[2], radius - distance)
+    return contact
 
 
 @wp.func

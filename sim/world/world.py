@@ -231,6 +231,8 @@ def build_world(config: WorldConfig | None = None, device: str = "cpu") -> World
     start_warp()
     config = config or WorldConfig()
     terrain = _terrain(config)
+    if isinstance(config, WorldFile) and config.heightmap is not None:
+        config = config.model_copy(update={"size_m": terrain.size_m, "cell_m": terrain.size_m / terrain.cells})
     trees = make_trees(
         config.seed,
         terrain,
