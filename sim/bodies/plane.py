@@ -79,7 +79,7 @@ def plane_inputs(model: PlaneModel, body: PlaneState, command: vec8, wind_ned: w
     """All that stays the same over the substeps of a tick; a plane that has crashed is left as it is."""
     inputs = PlaneInputs()
     inputs.wind_ned = wind_ned
-    inputs.around = over_solids(model.contact, look_around(world, model.contact, body.pos_ned))
+    inputs.around = over_solids(world, model.contact, look_around(world, model.contact, body.pos_ned))
     ratio = model.home_density_ratio * (1.0 + _DENSITY_LAPSE_PER_M * body.pos_ned[2])
     inputs.density = SEA_LEVEL_DENSITY_KG_M3 * ratio
     inputs.surface = body.surface

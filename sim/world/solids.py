@@ -1,9 +1,9 @@
 """Solids: everything of a world file that stands still, as one mesh of triangles: boxes, walls, cylinders, meshes, pads.
 
 One function answers where a ray meets them: range finders, cameras and the legs of vehicles all ask it, so that they
-agree. A leg is a ray from the centre of gravity to a foot: a surface that it crosses holds the foot, from whichever
-side. What has the vehicle beside or above itself (`FLOOR`) pushes its hull's sphere too. Surfaces are seen and touched
-from both sides. A world without any costs one comparison.
+agree (a leg is a ray from the centre of gravity to a foot: a surface that it crosses holds the foot). Spheres of hulls
+are pushed off what is no floor, by the distance to the same triangles. Surfaces are seen and touched from both sides. A
+world without any costs one comparison.
 """
 
 from dataclasses import dataclass
@@ -151,27 +151,6 @@ def solids_contact(solids: Solids, pos_ned: wp.vec3, radius: float) -> wp.vec4:
             if -normal[2] <= FLOOR:
                 contact = wp.vec4(normal[0], normal[1], normal[2], radius - distance)
     return contact
-
-
-@wp.func
-def solids_leg(solids: Solids, pos_ned: wp.vec3, arm_ned: wp.vec3) -> wp.vec4:
-    """How deep the end of a leg is behind the first surface that the leg crosses.
-
-    Args:
-        solids: of the world.
-        pos_ned: where the leg begins, outside of all solids [m].
-        arm_ned: from there to its end [m].
-
-    Returns:
-        x, y, z: unit normal towards the leg's beginning; w: depth of its end [m], 0 for none.
-    """
-    length = wp.length(arm_ned)
-    dir_ned = arm_ned / wp.max(length, 1.0e-6)
-    hit = solids_hit(solids, pos_ned, dir_ned, length)
-    if hit.face < 0:
-        return wp.vec4(0.0, 0.0, -1.0, 0.0)
-    depth = (hit.t - length) * wp.dot(hit.normal_ned, dir_ned)
-    return wp.vec4(hit.normal_ned[0], hit.normal_ned[1], hit.normal_ned[2], depth)
 
 
 @wp.func
