@@ -26,6 +26,12 @@ def _position(numbers: tuple[float, ...]) -> tuple[float, ...]:
     return numbers
 
 
+def _size(numbers: tuple[float, ...]) -> tuple[float, float, float]:
+    if len(numbers) != 3:
+        raise ValueError(f"must be length, width and height [m], not {len(numbers)} numbers")
+    return numbers
+
+
 def _colour(text: str) -> str:
     if not re.fullmatch("#[0-9a-fA-F]{6}", text):
         raise ValueError(f"must be a colour as '#rrggbb', such as '#a8a49e', not {text}")
@@ -45,6 +51,7 @@ def _beside(file: Path, info: ValidationInfo) -> Path:
 
 
 Position = Annotated[tuple[_Metres, ...], AfterValidator(_position)]
+Size = Annotated[tuple[Length, ...], AfterValidator(_size)]
 Colour = Annotated[str, AfterValidator(_colour)]
 Line = Annotated[tuple[tuple[_Metres, _Metres], ...], AfterValidator(_line)]
 File = Annotated[Path, AfterValidator(_beside)]
@@ -86,7 +93,7 @@ class BoxSolid(_Part):
 
     position_ned_m: Position
     """Middle of its bottom [m]: north, east and down, or north and east to stand on the ground."""
-    size_m: tuple[Length, Length, Length]
+    size_m: Size
     """Length along its heading, width, height [m]."""
     heading_deg: Heading = 0.0
     """Of its length, clockwise from north."""
