@@ -38,7 +38,7 @@ def heightmap_terrain(heightmap: Heightmap) -> TerrainMap:
 
 def write_heightmap(terrain: TerrainMap) -> tuple[bytes, Heightmap]:
     """The ground as a PNG of 16 bits, and the heightmap that reads it back; its file is still to be named."""
-    import cv2  # noqa: PLC0415
+    import cv2
 
     low, high = float(terrain.heights.min()), float(terrain.heights.max())
     span = max(high - low, 1.0e-3)
@@ -59,7 +59,7 @@ def _squared(heights: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def _png(heightmap: Heightmap) -> tuple[NDArray[np.float32], float]:
     """Heights [m], the first row north, and the distance of pixels [m]."""
-    import cv2  # noqa: PLC0415
+    import cv2
 
     missing = [name for name in _SCALES if getattr(heightmap, name) is None]
     if missing:
@@ -87,7 +87,7 @@ def _geotiff(heightmap: Heightmap) -> tuple[NDArray[np.float32], float]:
     if given:
         raise WorldError(("heightmap", given[0]), "a GeoTIFF has its own scale: leave this key out")
     try:
-        import rasterio  # noqa: PLC0415
+        import rasterio
     except ImportError:
         raise WorldError(
             _FILE, "reading a GeoTIFF needs the extra 'geo': pip install 'honeyguide[geo]' brings rasterio"

@@ -81,7 +81,7 @@ def _loaded(file: Path, loc: tuple[int | str, ...]) -> list[Any]:
 
 @lru_cache(maxsize=8)
 def _read(file: Path, _stamp_ns: int) -> list[Any]:
-    import trimesh  # noqa: PLC0415
+    import trimesh
 
     scene = trimesh.load_scene(file)
     return [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]

@@ -19,7 +19,7 @@ def read_image(file: Path, loc: tuple[int | str, ...]) -> NDArray[np.uint8]:
     Raises:
         WorldError: it cannot be read.
     """
-    import cv2  # noqa: PLC0415
+    import cv2
 
     try:
         data = np.frombuffer(file.read_bytes(), np.uint8)

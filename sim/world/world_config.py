@@ -10,7 +10,7 @@ MAX_CELLS = 1024  # per side: 4 MB of heights
 class WorldConfig(BaseModel):
     """What a world is made from. The defaults keep every tree within 120 m of home below 15 m above the home plane."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
     seed: int = Field(default=1, ge=0, le=2**32 - 1)
     """Seed of terrain and trees: same seed and settings, same bytes."""

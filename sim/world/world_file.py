@@ -72,7 +72,7 @@ def key_of(loc: tuple[int | str, ...]) -> str:
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 class Heightmap(_Part):
@@ -170,7 +170,7 @@ class PadSolid(_Part):
 class WorldFile(WorldConfig):
     """A world of one's own: a plain unless it says otherwise, and what stands on it."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
     size_m: float = Field(default=400.0, ge=50.0, le=10_000.0)
     """Side of the square map centred on home [m]; a heightmap has its own."""
