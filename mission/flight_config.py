@@ -15,8 +15,8 @@ from common.params import ParameterTable
 from mission.flight_settings import FlightSettings, Pace
 from mission.simulator.simulator_params import simulator_parameters
 from sim.bodies.vehicles import class_of
+from sim.world.custom.world_file import WorldFile
 from sim.world.world_config import WorldConfig
-from sim.world.world_file import WorldFile
 
 # For what needs a runway: level where it takes off and lands, and no trees where it flies.
 AIRFIELD = WorldConfig(clearing_radius_m=150.0, treeless_radius_m=500.0)

@@ -7,15 +7,15 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from sim.world import world_file
-from sim.world.world_file import WorldFile
+from sim.world.custom import world_file
+from sim.world.custom.world_file import WorldFile
 
 HEADER = """\
 # World file
 
 Written by `python -m docs.generate` from the code: do not edit.
 
-Every key of a [world file](../how-to/worlds.md), and every field of `sim.world.world_file.WorldFile`. Positions are ned
+Every key of a [world file](../how-to/worlds.md), and every field of `sim.world.custom.world_file.WorldFile`. Positions are ned
 [m] from home; one of two numbers is on the ground there. Paths of files are relative to the world file's folder.
 
 """

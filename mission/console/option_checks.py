@@ -79,8 +79,11 @@ def check_world(options: FlightOptions) -> None:
     if options.owner is not None:
         raise UserError("--owner and a world file: choose one, owners walk in worlds that are grown")
     for flag, name in (
-        ("--trees", "trees_per_ha"), ("--hills", "hill_height_m"), ("--walls", "has_walls"), ("--world-seed", "world_seed")
-    ):  # fmt: skip
+        ("--trees", "trees_per_ha"),
+        ("--hills", "hill_height_m"),
+        ("--walls", "has_walls"),
+        ("--world-seed", "world_seed"),
+    ):
         if getattr(options, name) != type(options).model_fields[name].default:
             raise UserError(f"{flag}: is said in the world file, {kind}")
 

@@ -31,7 +31,7 @@ from mission.view.vehicle_shapes.mesh import (
     trunk,
 )  # fmt: skip
 from mission.view.vehicle_shapes.plane import plane
-from sim.world.solid_parts import SolidPart
+from sim.world.custom.solid_parts import SolidPart
 from sim.world.walls import WALL_THICKNESS_M
 from sim.world.world import WorldMap
 

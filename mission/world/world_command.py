@@ -9,7 +9,6 @@ from rich.console import Console
 
 from mission.console.command_refusal import refuse
 from mission.console.name_checks import check_file
-from mission.console.option_checks import UserError
 from mission.console.terminal import loading
 
 
@@ -20,6 +19,8 @@ def world(
     ] = None,
 ) -> None:
     """Check a world file, say what is in it, and export it."""
+    from mission.console.option_checks import UserError
+
     check_file(file)
     console = Console()
     try:

@@ -11,7 +11,7 @@ from common.files import write_whole
 from mission.console.option_checks import UserError
 from mission.view import shapes
 from mission.world.world_shapes import part_mesh
-from sim.world.heightmap import write_heightmap
+from sim.world.custom.heightmap import write_heightmap
 from sim.world.world import WorldMap
 
 _GLTF_FROM_NED = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])

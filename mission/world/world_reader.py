@@ -1,4 +1,4 @@
-"""A world file read: YAML into a `WorldFile`, and what is wrong with it as one sentence: file, line, key, what is allowed."""
+"""A world file read: YAML into a `WorldFile`; what is wrong gets one sentence: file, line, key, what is allowed."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,8 +10,8 @@ from policies.learn.config.refusal import sentence
 from policies.learn.config.yaml_locations import ConfigError, Located, location_at, note_at, read_yaml
 
 if TYPE_CHECKING:
+    from sim.world.custom.world_file import WorldFile
     from sim.world.world import WorldMap
-    from sim.world.world_file import WorldFile
 
 
 def read_world(file: Path) -> "WorldFile":
@@ -29,8 +29,8 @@ def read_and_build(file: Path) -> "tuple[WorldFile, WorldMap]":
     Raises:
         UserError: there is no such world.
     """
+    from sim.world.custom.world_file import WorldError, WorldFile
     from sim.world.world import build_world
-    from sim.world.world_file import WorldError, WorldFile
 
     try:
         root = read_yaml(file, [])
@@ -42,7 +42,7 @@ def read_and_build(file: Path) -> "tuple[WorldFile, WorldMap]":
         first = error.errors()[0]
         said = sentence(first, WorldFile)
         if first["type"] == "extra_forbidden" and said == "unknown key":
-            said = f"unknown key; allowed are {', '.join(_keys_at(root, first['loc']))}"
+            said = f"unknown key; allowed are {', '.join(_keys_at(first['loc']))}"
         raise UserError(_at(root, first["loc"], said)) from error
     except WorldError as error:
         raise UserError(_at(root, error.loc, error.sentence)) from error
@@ -53,11 +53,11 @@ def _at(root: Located, loc: tuple[int | str, ...], said: str) -> str:
     return note_at(location, key, said)
 
 
-def _keys_at(root: Located, loc: tuple[int | str, ...]) -> list[str]:
+def _keys_at(loc: tuple[int | str, ...]) -> list[str]:
     """The keys that are allowed beside an unknown one."""
     from pydantic import BaseModel
 
-    from sim.world.world_file import WorldFile
+    from sim.world.custom.world_file import WorldFile
 
     model: type[BaseModel] = WorldFile
     for step in loc[:-1]:

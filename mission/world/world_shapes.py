@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from sim.world.solid_parts import SolidPart
+from sim.world.custom.solid_parts import SolidPart
 
 
 def part_mesh(part: SolidPart) -> trimesh.Trimesh:

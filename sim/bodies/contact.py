@@ -14,8 +14,8 @@ import warp as wp
 from common.airframes.multirotor import MultirotorAirframe
 from common.geodesy import GRAVITY_M_S2
 from common.kernels import MAX_MOTORS, vec8
+from sim.world.custom.solids import solids_gap, solids_hit
 from sim.world.neighbours import neighbour_touched
-from sim.world.solids import solids_gap, solids_hit
 from sim.world.world import World, ground_height, ground_normal_ned, obstacle_contact
 
 wp.set_module_options({"enable_backward": False})
@@ -118,9 +118,7 @@ def look_around(world: World, model: ContactModel, pos_ned: wp.vec3) -> Surround
 
 
 @wp.func
-def look_along_legs(
-    world: World, model: ContactModel, around: Surroundings, r_ned_from_frd: wp.mat33
-) -> Surroundings:
+def look_along_legs(world: World, model: ContactModel, around: Surroundings, r_ned_from_frd: wp.mat33) -> Surroundings:
     """The surroundings with the surfaces of solids that feet and rotor tips touch, or may before the tick is over."""
     near_m = model.reach_m + _OBSTACLE_MARGIN_M
     if solids_gap(world.solids, around.origin_ned, near_m)[3] >= near_m:

@@ -17,9 +17,9 @@ from common.rotation import yaw_from_quat
 from sim.rig import Rig
 from sim.truth import Truth
 from sim.world.boxes import Box, box_middle, in_box_axes
+from sim.world.custom.solids import FLOOR, solids_hit
 from sim.world.growing import bucket_of
 from sim.world.neighbours import neighbour_box
-from sim.world.solids import FLOOR, solids_hit
 from sim.world.trees import Forest, Tree
 from sim.world.walls import slab
 from sim.world.world import World, WorldMap, ground_height, top_surface, world_at
@@ -113,9 +113,7 @@ def add_trunks(forest: Forest, place: wp.vec2, heading: float, ranges_m: wp.arra
 
 
 @wp.func
-def add_solids(
-    world: World, place: wp.vec2, heading: float, ranges_m: wp.array2d(dtype=float), i: int
-) -> None:
+def add_solids(world: World, place: wp.vec2, heading: float, ranges_m: wp.array2d(dtype=float), i: int) -> None:
     """Casts level rays at two heights over what the ring stands on; what can be driven up is none of its returns."""
     up = top_surface(world, place[0], place[1])
     for ray in range(_RAYS):

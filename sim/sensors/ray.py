@@ -7,8 +7,8 @@ the ground is taken as it continues from the edge. Asked for every pixel, and on
 import warp as wp
 
 from sim.sensors.skyline import BLOCK_BUCKETS, Skyline
+from sim.world.custom.solids import SolidHit, solids_hit
 from sim.world.neighbours import Neighbours, neighbour_ray_hit
-from sim.world.solids import SolidHit, solids_hit
 from sim.world.terrain import terrain_height, terrain_ray_hit
 from sim.world.trees import Forest, Tree, tree_ray_hit
 from sim.world.walls import walls_ray_hit
@@ -164,12 +164,21 @@ def first_hit(w: World, skyline: Skyline, origin_ned: wp.vec3, dir_ned: wp.vec3,
     if w.neighbours.count > 0:
         hit = neighbour_hit(w.neighbours, w.boxes.tick, origin_ned, dir_ned, hit)
     if w.solids.count > 0:
-        solid = solids_hit(w.solids, origin_ned, dir_ned, hit.t)
-        if solid.face >= 0:
-            hit.t = solid.t
-            hit.kind = SOLID
-            hit.i_tree = solid.face
-            hit.solid = solid
+        hit = nearer_solid(w, origin_ned, dir_ned, hit)
+    return hit
+
+
+@wp.func
+def nearer_solid(w: World, origin_ned: wp.vec3, dir_ned: wp.vec3, known: Hit) -> Hit:
+    """The nearer of a known hit and the solids."""
+    solid = solids_hit(w.solids, origin_ned, dir_ned, known.t)
+    if solid.face < 0:
+        return known
+    hit = Hit()
+    hit.t = solid.t
+    hit.kind = SOLID
+    hit.i_tree = solid.face
+    hit.solid = solid
     return hit
 
 

@@ -20,9 +20,9 @@ from common.rng import draw_key
 from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
 from sim.rig import Rig
 from sim.world.boxes import Box, box_middle, in_box_axes
+from sim.world.custom.solids import FLOOR, Solids, solids_hit
 from sim.world.growing import bucket_of
 from sim.world.neighbours import neighbour_box
-from sim.world.solids import FLOOR, Solids, solids_hit
 from sim.world.trees import Forest, Tree
 from sim.world.walls import slab
 from sim.world.world import World, WorldMap, ray_hit, world_at

@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from sim.world.solids import SolidsMap
+from sim.world.custom.solids import SolidsMap
 
 wp.set_module_options({"enable_backward": False})
 

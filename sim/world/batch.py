@@ -14,6 +14,9 @@ import warp as wp
 from common.warp_start import start_warp
 from sim.world.boxes import Box, Boxes, BoxesMap
 from sim.world.building import build, most_boxes
+from sim.world.custom.solid_parts import SolidPart, solid_parts
+from sim.world.custom.solids import SolidsMap
+from sim.world.custom.world_file import WorldFile
 from sim.world.growing import (
     COVERAGE,
     EMPTY_M,
@@ -27,8 +30,6 @@ from sim.world.growing import (
     settle,
 )
 from sim.world.hills import find_highest, raise_noise, shape_hills
-from sim.world.solid_parts import SolidPart, solid_parts
-from sim.world.solids import SolidsMap
 from sim.world.terrain import Terrain, TerrainMap
 from sim.world.trees import (
     BUCKET_M,
@@ -42,7 +43,6 @@ from sim.world.trees import (
 )
 from sim.world.walls import WallsMap
 from sim.world.world import World, WorldConfig, WorldMap
-from sim.world.world_file import WorldFile
 
 wp.set_module_options({"enable_backward": False})
 

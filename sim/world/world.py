@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from common.warp_start import start_warp
 from sim.world.boxes import Boxes, BoxesMap, boxes_contact, boxes_ray_hit, no_boxes
+from sim.world.custom.heightmap import heightmap_terrain
+from sim.world.custom.solid_parts import solid_parts
+from sim.world.custom.solids import Solids, SolidsMap, solids_contact, solids_height, solids_ray_hit
+from sim.world.custom.world_file import WorldFile
 from sim.world.neighbours import Neighbours, neighbours_contact, neighbours_ray_hit
-from sim.world.heightmap import heightmap_terrain
-from sim.world.solid_parts import solid_parts
-from sim.world.solids import Solids, SolidsMap, solids_contact, solids_height, solids_ray_hit
 from sim.world.terrain import (
     FloatArray,
     Terrain,
@@ -29,14 +30,12 @@ from sim.world.terrain import (
 from sim.world.trees import Forest, ForestMap, forest_contact, forest_ray_hit, make_trees
 from sim.world.walls import Walls, WallsMap, walls_contact, walls_ray_hit
 from sim.world.world_config import WorldConfig
-from sim.world.world_file import WorldFile
 
 wp.set_module_options({"enable_backward": False})
 
 __all__ = [
-    "World", "WorldConfig", "WorldMap", "build_world", "ground_height", "ground_normal_ned", "obstacle_contact", "ray_hit",
-    "shared_world", "surface_height", "top_surface",
-    "world_at",
+    "World", "WorldConfig", "WorldMap", "build_world", "ground_height", "ground_normal_ned", "obstacle_contact",
+    "ray_hit", "shared_world", "surface_height", "top_surface", "world_at",
 ]  # fmt: skip
 
 

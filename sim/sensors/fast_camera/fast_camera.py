@@ -25,8 +25,8 @@ from sim.sensors.fast_camera.solid_rows import draw_solids
 from sim.sensors.fast_camera.solids import Sights, Solid
 from sim.sensors.solid_paint import make_paint
 from sim.world.clothes import Clothes, usual_clothes
+from sim.world.custom.solids import SolidsMap
 from sim.world.people import Person
-from sim.world.solids import SolidsMap
 from sim.world.trees import CROWN_RADIUS_FRACTION
 from sim.world.world import World, WorldConfig, WorldMap
 
@@ -78,8 +78,8 @@ class QuickCamera:
         optics: array of `sim.sensors.fast_camera.optics.Optics`, likewise; shape (0,) without optics.
         rgb: uint8, (count, height, width, 3).
         depth_m: float32, (count, height, width), along the optical axis; `sim.sensors.camera.SKY_DEPTH_M` for the sky.
-        kind: uint8, (count, height, width): SKY, GROUND, TRUNK, CROWN, WALL, PERSON, VEHICLE, SOLID of `sim.sensors.ray`. From
-            inside a tree or person all pixels are that, at depth 0.
+        kind: uint8, (count, height, width): SKY, GROUND, TRUNK, CROWN, WALL, PERSON, VEHICLE, SOLID of
+            `sim.sensors.ray`. From inside a tree or person all pixels are that, at depth 0.
         i_world: array of int, shape (count,).
     """
 
@@ -115,10 +115,7 @@ class QuickCamera:
         self._everyone = wp.full(count, value=True, dtype=wp.bool, device=device)
         self.optics = wp.zeros(count if has_optics else 0, dtype=Optics, device=device)
         perfect = (wp.zeros_like(self.rgb), wp.zeros_like(self.depth_m)) if has_optics else (self.rgb, self.depth_m)
-        outputs = Outputs()
-        outputs.rgb, outputs.depth_m, outputs.kind = perfect[0].flatten(), perfect[1].flatten(), self.kind.flatten()
-        outputs.front = wp.zeros(count * height * width, dtype=wp.int32, device=device)
-        outputs.width, outputs.height = width, height
+        outputs = _outputs(*perfect, self.kind)
         views = wp.zeros(count, dtype=View, device=device)
         columns = _columns(count, width, range_m, device)
         self._who = _people(people, clothes, count, device)
@@ -135,8 +132,8 @@ class QuickCamera:
         ]
         if worlds.solids.parts:
             self._paint = make_paint(worlds.solids, device)
-            seen_solids = [self._worlds, self.i_world, self._paint, paints, views, chosen, range_m, outputs]
-            passes.append((draw_solids, (height,), seen_solids))
+            shaded = [self._worlds, self.i_world, self._paint, paints, views, chosen, range_m, outputs]
+            passes.append((draw_solids, (height,), shaded))
         if has_optics:
             passes.append((expose, (height,), [self.lenses, chosen, self.optics, size, *images]))
         self._workers = Workers(count, threads)
@@ -172,6 +169,15 @@ def _recorded(a_pass: _Pass, chosen: Any, first: int, count: int, device: str) -
     kernel, dim, inputs = a_pass
     i_chosen = 1 + next(k for k, value in enumerate(inputs) if value is chosen)
     return wp.launch(kernel, (count, *dim), [first, *inputs], device=device, record_cmd=True), i_chosen
+
+
+def _outputs(rgb: Any, depth_m: Any, kind: Any) -> Any:
+    """The images as the rows write them."""
+    outputs = Outputs()
+    outputs.rgb, outputs.depth_m, outputs.kind = rgb.flatten(), depth_m.flatten(), kind.flatten()
+    outputs.front = wp.zeros(kind.size, dtype=wp.int32, device=kind.device)
+    outputs.height, outputs.width = kind.shape[1:]
+    return outputs
 
 
 def _worlds_of(i_world: Any, count: int, world_count: int) -> Any:

@@ -13,7 +13,7 @@ from sim.sensors.fast_camera.solids import NEVER
 from sim.sensors.ray import SKY, SOLID
 from sim.sensors.shading import EARTH_LIGHT, HAZE, SKY_LIGHT, SUN_LIGHT, SUN_NED
 from sim.sensors.solid_paint import SolidPaint, solid_albedo
-from sim.world.solids import solids_hit
+from sim.world.custom.solids import solids_hit
 from sim.world.world import World
 
 wp.set_module_options({"enable_backward": False})

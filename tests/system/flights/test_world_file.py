@@ -7,7 +7,7 @@ import trimesh
 from common.airframe import load_airframe
 from mission.flight import Flight, FlightConfig
 from sim.bodies.contact import resting_height_m
-from sim.world.world_file import BoxSolid, MeshSolid, PadSolid, WorldFile
+from sim.world.custom.world_file import BoxSolid, MeshSolid, PadSolid, WorldFile
 
 X500 = load_airframe("x500")
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from sim.world.custom.world_file import MeshSolid, WorldFile
 from sim.world.world import WorldMap, build_world
-from sim.world.world_file import MeshSolid, WorldFile
 
 
 def lump(folder: Path, seed: int = 1, *, subdivisions: int = 3) -> Path:
@@ -28,7 +28,9 @@ def world_of(**things) -> WorldMap:
 
 def lump_world(folder: Path, seed: int = 1, **more) -> WorldMap:
     """A lump whose middle is 5 m above a place north-east of home."""
-    return world_of(meshes=[MeshSolid(file=lump(folder, seed, **more), position_ned_m=(12.0, 7.0, -5.0), heading_deg=35.0)])
+    return world_of(
+        meshes=[MeshSolid(file=lump(folder, seed, **more), position_ned_m=(12.0, 7.0, -5.0), heading_deg=35.0)]
+    )
 
 
 def ray_oracle(world: WorldMap, origins: np.ndarray, dirs: np.ndarray) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Laws of solids: what a ray meets, a camera sees and a vehicle touches is one surface."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -10,9 +12,9 @@ from sim.sensors.camera import CameraPose, Renderer
 from sim.sensors.fast_camera.fast_camera import QuickCamera
 from sim.sensors.ray import SOLID
 from sim.world.batch import WorldBatch
-from sim.world.solid_parts import sides_of
+from sim.world.custom.solid_parts import sides_of
+from sim.world.custom.world_file import BoxSolid, CylinderSolid, MeshSolid, PadSolid, WallSolid, WorldFile
 from sim.world.world import WorldConfig, build_world
-from sim.world.world_file import BoxSolid, CylinderSolid, MeshSolid, PadSolid, WallSolid, WorldFile
 from tests.unit.sim.fleet import Fleet
 from tests.unit.sim.rover_fleet import RoverFleet, up_ned
 from tests.unit.sim.world.meshes import lump, lump_world, ray_oracle, rays_at, world_of
@@ -104,7 +106,7 @@ def test_a_wall_follows_its_corners_and_stands_on_hills():
     line = ((40.0, -20.0), (40.0, 20.0), (70.0, 20.0))
     world = world_of(walls=[WallSolid(points_ne_m=line, height_m=1.0)], **hills)
     along = np.linspace(0.0, 1.0, 60)[:, None]
-    points = np.concatenate([np.add(a, along * np.subtract(b, a)) for a, b in zip(line[:-1], line[1:], strict=True)])
+    points = np.concatenate([np.add(a, along * np.subtract(b, a)) for a, b in pairwise(line)])
     tops = world.solids.height(points[:, 0], points[:, 1])
     assert (tops - world.height(points[:, 0], points[:, 1])).min() > 0.99
 
@@ -145,9 +147,7 @@ def test_a_vehicle_over_a_roof_s_edge_falls_off():
 
 
 def test_a_hull_is_stopped_by_sides_and_a_rotor_struck_from_below_breaks():
-    world = world_of(
-        boxes=[TABLE], cylinders=[CylinderSolid(position_ned_m=(0.0, 20.0), radius_m=1.0, height_m=6.0)]
-    )
+    world = world_of(boxes=[TABLE], cylinders=[CylinderSolid(position_ned_m=(0.0, 20.0), radius_m=1.0, height_m=6.0)])
     fleet = Fleet([(0.0, 18.0, -5.0), (0.0, 0.0, -2.4)], world=world)
     fleet.state["vel_ned"][0] = (0.0, 1.5, 0.0)
     fleet.state["q_ned_from_frd"][1] = (1.0, 0.0, 0.0, 0.0)  # upside down, over the table
@@ -223,5 +223,3 @@ def test_solids_hide_what_is_behind_them_and_shade_the_ground():
     assert (red[:, 0] > 2 * red[:, 1]).all()
     changed = (bare.rgb[0] != seen.rgb[0]).any(axis=-1)
     assert (changed & ~is_box).sum() > 0  # its shadow
-
-

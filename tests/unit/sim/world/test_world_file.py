@@ -5,9 +5,9 @@ import pytest
 import trimesh
 from pydantic import ValidationError
 
-from sim.world.heightmap import write_heightmap
+from sim.world.custom.heightmap import write_heightmap
+from sim.world.custom.world_file import BoxSolid, Heightmap, MeshSolid, PadSolid, WallSolid, WorldError, WorldFile
 from sim.world.world import WorldConfig, build_world
-from sim.world.world_file import BoxSolid, Heightmap, MeshSolid, PadSolid, WallSolid, WorldError, WorldFile
 from tests.unit.sim.world.meshes import lump, world_of
 
 
@@ -49,7 +49,9 @@ def test_a_heightmap_goes_out_and_comes_back_to_a_fraction_of_a_millimetre(tmp_p
 
 
 def test_a_png_without_scale_is_refused_in_a_sentence(tmp_path):
-    with pytest.raises(WorldError, match="^heightmap: a PNG has no scale of its own: metres_per_pixel and height_min_m"):
+    with pytest.raises(
+        WorldError, match=r"^heightmap: a PNG has no scale of its own: metres_per_pixel and height_min_m"
+    ):
         world_of(heightmap=Heightmap(file=ramp_png(tmp_path, np.uint8), height_max_m=3.0))
 
 
@@ -132,7 +134,9 @@ def test_a_mesh_with_holes_is_refused_unless_surfaces_are_meant(tmp_path):
     mesh = trimesh.load_mesh(lump(tmp_path))
     mesh.update_faces(np.arange(len(mesh.faces)) > 3)
     mesh.export(tmp_path / "holed.stl")
-    with pytest.raises(WorldError, match=r"meshes\[0\].file: .*holed.stl has holes \(\d+ open edges\): close them, or say"):
+    with pytest.raises(
+        WorldError, match=r"meshes\[0\].file: .*holed.stl has holes \(\d+ open edges\): close them, or say"
+    ):
         world_of(meshes=[MeshSolid(file=tmp_path / "holed.stl")])
     world = world_of(meshes=[MeshSolid(file=tmp_path / "holed.stl", thin=True)])
     assert len(world.solids.faces) == len(mesh.faces)

@@ -1,4 +1,4 @@
-"""Solids: everything of a world file that stands still, as one mesh of triangles: boxes, walls, cylinders, meshes, pads.
+"""Solids: all that stands in a world file, as one mesh of triangles: boxes, walls, cylinders, meshes, pads.
 
 One function answers where a ray meets them: range finders, cameras and the legs of vehicles all ask it, so that they
 agree (a leg is a ray from the centre of gravity to a foot: a surface that it crosses holds the foot). Spheres of hulls
@@ -18,7 +18,7 @@ from sim.world.terrain import FloatArray
 from sim.world.trees import NO_OBSTACLE_M
 
 if TYPE_CHECKING:
-    from sim.world.solid_parts import SolidPart
+    from sim.world.custom.solid_parts import SolidPart
 
 wp.set_module_options({"enable_backward": False})
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.world.custom.world_file import Heightmap, WorldError
 from sim.world.terrain import TerrainMap
-from sim.world.world_file import Heightmap, WorldError
 
 MAX_PIXELS = 4096  # per side: 64 MB of heights
 _FILE = ("heightmap", "file")

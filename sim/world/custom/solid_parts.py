@@ -5,16 +5,16 @@ parts as well.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil, cos, pi, radians, sin, sqrt
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.world.mesh_files import read_mesh
-from sim.world.solid_images import pad_mark, read_image
-from sim.world.terrain import TerrainMap
-from sim.world.world_file import (
+from sim.world.custom.mesh_files import read_mesh
+from sim.world.custom.solid_images import pad_mark, read_image
+from sim.world.custom.world_file import (
     BoxSolid,
     CylinderSolid,
     PadSolid,
@@ -22,6 +22,7 @@ from sim.world.world_file import (
     WallSolid,
     WorldFile,
 )
+from sim.world.terrain import TerrainMap
 
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int32]
@@ -92,7 +93,7 @@ def _wall(item: WallSolid, terrain: TerrainMap, k: int) -> SolidPart:
     """A box for each stretch, long enough to close the corners."""
     stretches: list[Vertices] = []
     points = np.array(item.points_ne_m)
-    for start, end in zip(points[:-1], points[1:], strict=True):
+    for start, end in pairwise(points):
         along = end - start
         length = float(np.hypot(*along))
         line = start + np.linspace(0.0, 1.0, max(2, ceil(length / _STEP_M)))[:, None] * along
@@ -117,7 +118,7 @@ def _wall(item: WallSolid, terrain: TerrainMap, k: int) -> SolidPart:
 
 def _cuboid(size_m: tuple[float, float, float]) -> tuple[Vertices, Faces, NDArray[np.float32]]:
     """A box on its bottom's middle, four corners a side, so that each side has its own image."""
-    length, width, height = size_m
+    height = size_m[2]
     corners: list[list[float]] = []
     faces: list[list[int]] = []
     for axis in range(3):

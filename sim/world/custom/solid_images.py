@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.world.world_file import WorldError
+from sim.world.custom.world_file import WorldError
 
 MAX_SIDE = 8192
 _MARK_SIDE = 256

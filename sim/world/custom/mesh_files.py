@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.world.solid_images import read_image
-from sim.world.world_file import FARTHEST_M, MeshSolid, WorldError
+from sim.world.custom.solid_images import read_image
+from sim.world.custom.world_file import FARTHEST_M, MeshSolid, WorldError
 
 KINDS = (".stl", ".obj", ".ply", ".gltf", ".glb")
 MAX_TRIANGLES = 5_000_000
@@ -60,7 +60,7 @@ def read_mesh(item: MeshSolid, loc: tuple[int | str, ...]) -> list[FilePart]:
 
 
 def _loaded(file: Path, loc: tuple[int | str, ...]) -> list[Any]:
-    """trimesh's meshes of a file, each where the file puts it."""
+    """The meshes of a file as trimesh reads them, each where the file puts it."""
     if file.suffix.lower() not in KINDS:
         raise WorldError(loc, f"{file}: must be one of {', '.join(KINDS)}")
     try:
