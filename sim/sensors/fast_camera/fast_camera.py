@@ -99,8 +99,7 @@ class QuickCamera:
         threads: int = 1,
         device: str = "cpu",
     ) -> None:
-        config = worlds.config
-        self._seen = worlds  # kernels' structs do not keep their arrays alive
+        config, self._seen = worlds.config, worlds  # kernels' structs do not keep their arrays alive
         if isinstance(worlds, WorldMap):
             self._worlds = wp.array([worlds.kernel], dtype=World, device=device)
         else:
