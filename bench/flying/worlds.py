@@ -1,8 +1,8 @@
 """How long does a fresh world for an episode take, one core?
 
 One world of a batch is grown anew at a time, as at the end of an episode: as they are for FollowMe, with six times as
-many trees, and on a grid twice as fine; then all worlds of the batch at once. And what flying over a mesh of 100 k triangles
-costs, over what it costs over a plain: vehicles fall past it, from 6 m above to 1 m above.
+many trees, and on a grid twice as fine; then all worlds of the batch at once. And what flying over a mesh of 100 k
+triangles costs, over what it costs over a plain: vehicles fall past it, from 6 m above to 1 m above.
 """
 
 import time

@@ -16,8 +16,8 @@ HEADER = """\
 Written by `python -m docs.generate` from the code: do not edit.
 
 Every key of a [world file](../how-to/worlds.md), and every field of `WorldFile` in `sim/world/custom/world_file.py`.
-Positions are ned [m] from home; one of two numbers is on the ground there. Paths of files are relative to the world file's
-folder.
+Positions are ned [m] from home; one of two numbers is on the ground there. Paths of files are relative to the folder of
+the world file.
 
 """
 LISTS = {
