@@ -39,17 +39,16 @@ def export_world(world: WorldMap, file: Path) -> None:
 
 def glb_bytes(world: WorldMap) -> bytes:
     """Everything that stands still, as one glTF file."""
-    scene = trimesh.Scene()
+    scene: Any = trimesh.Scene()
     _add(scene, "ground", _coloured(shapes.ground(world, _GROUND_CELLS)))
     for name, mesh in (("edge_walls", shapes.walls(world)), ("boxes", shapes.boxes(world))):
         if mesh is not None:
             _add(scene, name, _coloured(mesh))
-    for name, mesh in _trees(world):
-        _add(scene, name, mesh)
+    for name, many in _trees(world):
+        _add(scene, name, many)
     for part in world.solids.parts:
         _add(scene, part.name, part_mesh(part))
-    data: Any = scene.export(file_type="glb")
-    return bytes(data)
+    return bytes(scene.export(file_type="glb"))
 
 
 def _add(scene: trimesh.Scene, name: str, mesh: trimesh.Trimesh) -> None:
@@ -74,7 +73,8 @@ def _trees(world: WorldMap) -> list[tuple[str, trimesh.Trimesh]]:
     ):
         count, corners = len(places), len(mesh.vertices)
         vertices = (mesh.vertices[None] * sizes[:, None] + places[:, None]).reshape(-1, 3)
-        faces = (mesh.faces[None] + np.arange(count)[:, None, None] * corners).reshape(-1, 3)
+        firsts = np.arange(count, dtype=np.uint32)[:, None, None] * np.uint32(corners)
+        faces = (mesh.faces[None] + firsts).reshape(-1, 3)
         found.append(
             (name, _coloured(shapes.Mesh(vertices.astype(np.float32), faces, np.repeat(tints, corners, axis=0))))
         )

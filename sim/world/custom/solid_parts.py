@@ -116,7 +116,7 @@ def _wall(item: WallSolid, terrain: TerrainMap, k: int) -> SolidPart:
     )
 
 
-def _cuboid(size_m: tuple[float, float, float]) -> tuple[Vertices, Faces, NDArray[np.float32]]:
+def _cuboid(size_m: tuple[float, ...]) -> tuple[Vertices, Faces, NDArray[np.float32]]:
     """A box on its bottom's middle, four corners a side, so that each side has its own image."""
     height = size_m[2]
     corners: list[list[float]] = []
