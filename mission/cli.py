@@ -19,6 +19,7 @@ from mission.follow import follow_commands
 from mission.park import park_command
 from mission.train import task_commands, training_commands
 from mission.view import replay_command
+from mission.world import world_command
 
 if TYPE_CHECKING:
     from mission.flight_settings import FlightOptions
@@ -117,19 +118,25 @@ def picture(
     pitch: Annotated[float, typer.Option(min=-90.0, max=90.0, help="Up from the horizon [deg].")] = -10.0,
     fov: Annotated[float, typer.Option(min=5.0, max=150.0, help="Horizontal field of view [deg].")] = 80.0,
     size: Annotated[str, typer.Option(help="Width and height.")] = "1280x720",
+    world: Annotated[Path | None, typer.Option(help="A world file, instead of hills and trees.")] = None,
     world_seed: Annotated[int, typer.Option(min=0, help="Seed of hills and trees.")] = 1,
     trees: Annotated[float, typer.Option(min=0.0, max=1000.0, help="Trees per hectare.")] = 60.0,
     hills: Annotated[float, typer.Option(min=0.0, max=300.0, help="Height of the hills [m].")] = 12.0,
 ) -> None:
     """Take a picture of the world from a place in it."""
+    from mission.console.option_checks import UserError
     from mission.flight_config import TREELESS_M
     from mission.video.image_command import ImageError, Viewpoint, take_image
-    from sim.world.world import WorldConfig
+    from mission.world.world_reader import read_world
+    from sim.world.world_config import WorldConfig
 
-    world = WorldConfig(seed=world_seed, trees_per_ha=trees, hill_height_m=hills, treeless_radius_m=TREELESS_M)
     try:
-        take_image(output, world, Viewpoint(north, east, up, yaw, pitch, fov), size)
-    except ImageError as error:
+        if world is None:
+            config = WorldConfig(seed=world_seed, trees_per_ha=trees, hill_height_m=hills, treeless_radius_m=TREELESS_M)
+        else:
+            config = read_world(world)
+        take_image(output, config, Viewpoint(north, east, up, yaw, pitch, fov), size)
+    except (ImageError, UserError) as error:
         refuse(str(error))
 
 
@@ -140,6 +147,7 @@ app.command()(follow_commands.companion)
 app.command()(benchmark_command.benchmark)
 app.command(cls=LateCommand)(park_command.park)
 app.command()(replay_command.replay)
+app.command()(world_command.world)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)
 app.command(name="eval")(training_commands.evaluate)
 app.command()(training_commands.export)

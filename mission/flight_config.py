@@ -15,7 +15,8 @@ from common.params import ParameterTable
 from mission.flight_settings import FlightSettings, Pace
 from mission.simulator.simulator_params import simulator_parameters
 from sim.bodies.vehicles import class_of
-from sim.world.world import WorldConfig
+from sim.world.custom.world_file import WorldFile
+from sim.world.world_config import WorldConfig
 
 # For what needs a runway: level where it takes off and lands, and no trees where it flies.
 AIRFIELD = WorldConfig(clearing_radius_m=150.0, treeless_radius_m=500.0)
@@ -48,8 +49,8 @@ class FlightConfig(FlightSettings):
     """Where the vehicle boots, north and east of it [m]."""
     parameters: dict[str, float] = Field(default_factory=dict)
     """Values of the flight controller's parameters that differ from their defaults, by name."""
-    world: WorldConfig = WorldConfig()
-    """The ground; with an owner: grown as in training, from its seed."""
+    world: WorldConfig | WorldFile = WorldConfig()
+    """The ground, or a world of one's own; with an owner: grown as in training, from its seed."""
     boot_unix_us: int = Field(default=SIMULATED_EPOCH_US, ge=0)
     """The date of power-on, as Unix time, in lockstep; a flight that is paced by the wall clock takes the wall's."""
     is_forest: bool = False

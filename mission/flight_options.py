@@ -1,5 +1,6 @@
 """The flight that options of the command line describe; what is wrong with them gets one sentence."""
 
+from pathlib import Path
 from typing import Any, cast
 
 from pydantic import ValidationError
@@ -8,7 +9,7 @@ from common.airframe import AirframeError, load_airframe
 from common.params import ParameterError
 from common.state_folder import StateFolder
 from mission.console.model_command import first_fault
-from mission.console.option_checks import UserError, home_of, parameter_of
+from mission.console.option_checks import UserError, home_of, is_world_file, parameter_of
 from mission.flight_config import AIRFIELD, TREELESS_M, FlightConfig, OwnerConfig, flight_parameters
 from mission.flight_settings import OURS, FlightOptions, FlightSettings, Pace
 from mission.flight_state_folder import stored_home
@@ -62,6 +63,10 @@ def _follows_on_wheels(options: FlightOptions) -> bool:
 
 def _world(options: FlightOptions) -> WorldConfig:
     """With an owner the world of training: its hills can be walked; to fly alone no trees near home."""
+    if is_world_file(options):
+        from mission.world.world_reader import read_world
+
+        return read_world(Path(options.world_kind))
     numbers = {"trees_per_ha": options.trees_per_ha, "hill_height_m": options.hill_height_m}
     chosen: dict[str, Any] = {name: number for name, number in numbers.items() if number is not None}
     given: dict[str, Any] = {"seed": options.world_seed} | chosen

@@ -16,7 +16,8 @@ from mission.console.model_command import option
 Pace = Literal["walk", "run"]
 EngineName = Literal["native", "pybullet", "jsbsim"]
 BoardName = Literal["own", "ardupilot", "px4", "betaflight"]
-WorldKind = Literal["hills", "forest", "walled-forest", "course", "car-park"]
+WORLD_KINDS = ("hills", "forest", "walled-forest", "course", "car-park")
+WORLD_FILES = (".yaml", ".yml")
 OURS: tuple[BoardName, ...] = ("own", "betaflight")
 """Under these it is our own flight controller that flies, with its options, parameters and links."""
 _HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
@@ -83,12 +84,12 @@ class FlightOptions(FlightSettings):
         None, "Height of the hills [m].", "--hills", shown="12; in the forest 4", ge=0.0, le=300.0
     )
     has_walls: bool = option(False, "Walls along the edges of the map.", "--walls")
-    world_kind: WorldKind = option(
+    world_kind: str = option(
         "hills",
-        "hills, forest, walled-forest (for a rover), course (walls, trees, movers) or car-park.",
+        "hills, forest, walled-forest (for a rover), course (walls, trees, movers), car-park, or a world file (.yaml).",
         "--world",
     )
-    """The last two are to be driven in: of the options about the world they take its seed alone."""
+    """The last two kinds are to be driven in: of the options about the world they take its seed alone; a file none."""
     host: str = option("127.0.0.1", "Address ground stations are sent to.")
     bind: str = option("", "Address the vehicle's ports are open at. Default: loopback.")
     tcp_port: int | None = option(None, "TCP port for clients that connect; ArduPilot's is 5760.", ge=1, le=65535)
@@ -155,7 +156,7 @@ class ParkOptions(FlightOptions):
     is_idle: bool = option(False, "Park nowhere by itself: wait for clicks on the page, and for gotos.", "--idle")
     airframe: str = option("rover", "Airframe name or TOML file; the policies were trained on rover.")
     has_guard: bool = option(True, "A guard that does not believe the policy bounds it.", "--guard/--no-guard")
-    world_kind: WorldKind = "car-park"
+    world_kind: str = "car-park"
     has_lidar: bool = True
     has_base: bool = True
 

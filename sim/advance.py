@@ -21,7 +21,7 @@ from sim.faults import weakened
 from sim.sensors.sensors import Faults, SensorModel, SensorState, sense
 from sim.truth import Truth, true_battery, true_estimate
 from sim.wind import WindModel, WindState, wind_step
-from sim.world.world import World, ground_height
+from sim.world.world import World, ground_height, top_surface
 
 wp.set_module_options({"enable_backward": False})
 
@@ -80,7 +80,7 @@ def rig_kernels(body: Body, law: ControlLaw) -> RigKernels:
         if is_chosen[i] == 0:
             return
         model = rig.model[i]
-        down = -ground_height(rig.worlds[rig.i_world[i]], start_ne[0], start_ne[1]) - standing_height(model)
+        down = -top_surface(rig.worlds[rig.i_world[i]], start_ne[0], start_ne[1]) - standing_height(model)
         state = at_rest(model, wp.vec3(start_ne[0], start_ne[1], down), 0.0)
         rig.body[i] = state
         rig.truth[i] = truth_of(state)

@@ -12,6 +12,7 @@ from common.params import Parameter
 from docs.generate.mavlink_page import mavlink_text
 from docs.generate.tasks_page import tasks_text
 from docs.generate.training_page import training_text
+from docs.generate.world_page import world_text
 from mission.flight import Flight, FlightConfig
 from mission.simulator.simulator_params import simulator_parameters
 from sim.bodies.vehicles import class_of
@@ -104,6 +105,7 @@ def generated_pages() -> dict[Path, str]:
         REFERENCE / "mavlink.md": mavlink_text(Flight(FlightConfig()).server),
         REFERENCE / "training-config.md": training_text(),
         REFERENCE / "tasks.md": tasks_text(),
+        REFERENCE / "world-file.md": world_text(),
     }
 
 

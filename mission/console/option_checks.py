@@ -4,6 +4,7 @@ Warp, which the world and the vehicle are made of, takes longer to import than a
 """
 
 from importlib.util import find_spec
+from pathlib import Path
 from typing import get_args
 
 from common.airframe import Airframe, AirframeError, load_airframe
@@ -11,7 +12,7 @@ from common.airframes.multirotor import MultirotorAirframe
 from common.airframes.plane import PlaneAirframe
 from common.airframes.rover import RoverAirframe
 from common.geodesy import DEFAULT_HOME, GeoPoint
-from mission.flight_settings import FlightOptions, FlightSettings, Pace
+from mission.flight_settings import WORLD_FILES, WORLD_KINDS, FlightOptions, FlightSettings, Pace
 from mission.plan.plan_file import PlanError, read_plan
 
 HOME_MOST = (89.0, 180.0, 6000.0)  # latitude and longitude [deg], altitude [m]: highest airfields
@@ -61,6 +62,32 @@ def check_owner(options: FlightOptions) -> None:
         raise UserError("--owner and --world forest: choose one, owners walk where more room is")
 
 
+def is_world_file(options: FlightOptions) -> bool:
+    """Whether the world is one of the user's own."""
+    return options.world_kind.lower().endswith(WORLD_FILES)
+
+
+def check_world(options: FlightOptions) -> None:
+    """Refuses a world that is neither of a known kind nor a file, and what a file has itself."""
+    kind = options.world_kind
+    if not is_world_file(options):
+        if kind not in WORLD_KINDS:
+            raise UserError(f"--world {kind}: must be {', '.join(WORLD_KINDS)} or a file that ends with .yaml")
+        return
+    if not Path(kind).is_file():
+        raise UserError(f"--world {kind}: no such file")
+    if options.owner is not None:
+        raise UserError("--owner and a world file: choose one, owners walk in worlds that are grown")
+    for flag, name in (
+        ("--trees", "trees_per_ha"),
+        ("--hills", "hill_height_m"),
+        ("--walls", "has_walls"),
+        ("--world-seed", "world_seed"),
+    ):
+        if getattr(options, name) != type(options).model_fields[name].default:
+            raise UserError(f"{flag}: is said in the world file, {kind}")
+
+
 def check_options(options: FlightOptions) -> None:
     """Refuses what can be seen to be wrong before Warp is imported; parameters are left to `flight_options`.
 
@@ -69,6 +96,7 @@ def check_options(options: FlightOptions) -> None:
     """
     check_end(options, speed_of(options.speed))
     check_alone(options)
+    check_world(options)
     try:
         if options.plan is not None:
             read_plan(options.plan)

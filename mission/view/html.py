@@ -62,7 +62,7 @@ def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
         **_trees(world),
         "vehicle": _mesh(shape.body),
         "blade": _mesh(shape.blade),
-        "boxes": None if (boxes := shapes.boxes(world, movers=False)) is None else _mesh(boxes),
+        "boxes": None if (boxes := shapes.standing(world)) is None else _mesh(boxes),
         "movers": _movers(recording, world),
         "others": [_other(other) for other in recording.others],
         "wheel": _mesh(shape.wheels[0]) if shape.drives else None,

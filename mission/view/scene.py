@@ -19,6 +19,7 @@ from mission.view import shapes
 from mission.view.flight_snapshot import Moment
 from mission.view.pose_goals import Pose
 from mission.view.vehicle_nodes import TRAIL_M, Trail, VehicleNodes, add_mesh, segments, wxyz_of
+from mission.world.world_shapes import part_mesh
 from sim.world.world import WorldMap
 
 VEHICLE_RGB, OWNER_RGB, GOAL_RGB, PLAN_RGB = (40, 110, 220), (232, 120, 32), (220, 40, 90), (250, 250, 250)
@@ -104,6 +105,8 @@ class Scene:
         for i, mesh in shapes.moving_boxes(world):
             self._movers.append((i, self._api.add_frame(f"/world/mover{i}", show_axes=False)))
             add_mesh(self._api, f"/world/mover{i}/box", mesh)
+        for part in world.solids.parts:
+            self._api.add_mesh_trimesh(f"/world/solids/{part.name}", part_mesh(part))
         forest = shapes.trees(world)
         count = len(forest.trunk_ned)
         if count == 0:

@@ -31,13 +31,14 @@ from mission.view.vehicle_shapes.mesh import (
     trunk,
 )  # fmt: skip
 from mission.view.vehicle_shapes.plane import plane
+from sim.world.custom.solid_parts import SolidPart
 from sim.world.walls import WALL_THICKNESS_M
 from sim.world.world import WorldMap
 
 __all__ = [
     "BARK", "BLADE", "FRAME", "SUN_NED", "Mesh", "Trees", "VehicleShape", "ball", "beam", "blade_radius_m", "box",
-    "boxes", "ground", "hubs_frd", "joined", "moving_boxes", "multirotor", "person", "trees", "trunk", "vehicle",
-    "walls", "wheel_attitude",
+    "boxes", "ground", "hubs_frd", "joined", "moving_boxes", "multirotor", "person", "standing", "trees", "trunk",
+    "vehicle", "walls", "wheel_attitude",
 ]  # fmt: skip
 
 SUN_NED = np.array([-0.60, 0.51, -0.62], np.float32)  # where the light comes from: as in the cameras' images, nearly
@@ -133,6 +134,20 @@ def boxes(world: WorldMap, tick: int = 0, *, movers: bool = True) -> Mesh | None
         for mesh in [_box_round_middle(row)]
     ]
     return joined(meshes) if meshes else None
+
+
+def standing(world: WorldMap) -> Mesh | None:
+    """All boxes that stand and all solids of a world file, each part in one colour; None if there are none."""
+    still = boxes(world, movers=False)
+    meshes = [*([] if still is None else [still]), *(_in_one_colour(part) for part in world.solids.parts)]
+    return joined(meshes) if meshes else None
+
+
+def _in_one_colour(part: SolidPart) -> Mesh:
+    """That of an image is its mean."""
+    rgb = part.rgb if part.image is None else part.image.reshape(-1, 3).mean(axis=0)
+    colours = np.tile(np.array(rgb, np.uint8), (len(part.vertices_ned), 1))
+    return Mesh(part.vertices_ned, part.faces.astype(np.uint32), colours)
 
 
 def moving_boxes(world: WorldMap) -> list[tuple[int, Mesh]]:

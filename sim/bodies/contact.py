@@ -7,21 +7,25 @@ Left out: terrain curvature under one vehicle, torque from obstacles, deformatio
 """
 
 import math
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import warp as wp
 
 from common.airframes.multirotor import MultirotorAirframe
 from common.geodesy import GRAVITY_M_S2
-from common.kernels import vec8
+from common.kernels import MAX_MOTORS, vec8
+from sim.world.custom.solids import solids_gap, solids_hit
 from sim.world.neighbours import neighbour_touched
 from sim.world.world import World, ground_height, ground_normal_ned, obstacle_contact
 
 wp.set_module_options({"enable_backward": False})
 
 FEET = wp.constant(4)
+Vec12: TypeAlias = Any if TYPE_CHECKING else wp.types.vector(length=4 + MAX_MOTORS, dtype=wp.float32)
 
 _OBSTACLE_MARGIN_M = wp.constant(0.2)  # an obstacle nearer than this is found before the substeps reach it: 50 m/s
 _NEAR_FACTOR = wp.constant(1.5)  # steep ground is nearer than the height above it: good to 48 deg
+_NOWHERE_M = wp.constant(1.0e6)
 _FRICTION = wp.constant(0.7)  # JSBSim F450 Gear.xml: 0.8 static, 0.5 dynamic
 _NORMAL_RATE_RAD_S = 90.0  # guess: legs yield 1.2 mm under the weight; stable and damped at 1 ms
 _TANGENT_RATE_RAD_S = 120.0  # guess: as stiff as 1 ms steps allow
@@ -60,6 +64,11 @@ class Surroundings:
     obstacle_vel_ned: wp.vec3  # [m/s] of another vehicle; all else stands as far as contact goes
     obstacle_shift_ned: wp.vec3  # [m] how far it has gone since it was looked up
     obstacle_rigidity: float  # fraction of a rigid obstacle's push: less where the other hull yields too
+    is_near_solid: int
+    leg_normal_x: Vec12  # ned, of the solid's surface that each leg crosses, or will if it grows by the margin
+    leg_normal_y: Vec12
+    leg_normal_z: Vec12
+    leg_offset_m: Vec12  # of each surface's plane along its normal, from where it was looked up
 
 
 @wp.struct
@@ -109,6 +118,40 @@ def look_around(world: World, model: ContactModel, pos_ned: wp.vec3) -> Surround
 
 
 @wp.func
+def look_along_legs(world: World, model: ContactModel, around: Surroundings, r_ned_from_frd: wp.mat33) -> Surroundings:
+    """The surroundings with the surfaces of solids that feet and rotor tips touch, or may before the tick is over."""
+    near_m = model.reach_m + _OBSTACLE_MARGIN_M
+    if solids_gap(world.solids, around.origin_ned, near_m)[3] >= near_m:
+        return around
+    around.is_near_solid = 1
+    for point in range(model.point_count):
+        arm_ned = r_ned_from_frd * contact_point_frd(model, point)
+        length = wp.length(arm_ned)
+        along_ned = arm_ned / length
+        hit = solids_hit(world.solids, around.origin_ned, along_ned, length + _OBSTACLE_MARGIN_M)
+        around.leg_normal_x[point] = hit.normal_ned[0]
+        around.leg_normal_y[point] = hit.normal_ned[1]
+        around.leg_normal_z[point] = hit.normal_ned[2]
+        around.leg_offset_m[point] = -_NOWHERE_M
+        if hit.face >= 0:
+            around.leg_offset_m[point] = hit.t * wp.dot(hit.normal_ned, along_ned)
+    return around
+
+
+@wp.func
+def over_solids(world: World, model: ContactModel, around: Surroundings) -> Surroundings:
+    """The surroundings of a vehicle that takes what is straight below itself for the plane of its ground."""
+    if world.solids.count > 0:
+        reach_m = _NEAR_FACTOR * model.reach_m + _OBSTACLE_MARGIN_M
+        hit = solids_hit(world.solids, around.origin_ned, wp.vec3(0.0, 0.0, 1.0), reach_m)
+        if hit.face >= 0 and hit.t < around.height_agl_m:
+            around.is_near_ground = 1
+            around.height_agl_m = hit.t
+            around.normal_ned = hit.normal_ned
+    return around
+
+
+@wp.func
 def contact_point_frd(model: ContactModel, point: int) -> wp.vec3:
     """Feet 0..3 (front right, rear right, front left, rear left), then rotor tips in rotor order [m]."""
     if point >= FEET:
@@ -144,7 +187,7 @@ def ground_contact(
     foot_slip: FootSlip,
     dt: float,
 ) -> ContactForce:
-    """Forces of the ground on feet and rotor tips.
+    """Forces of ground and solids on feet and rotor tips: of each, what it is deeper in.
 
     A normal spring and damper that never pull, and friction within Coulomb's cone.
     """
@@ -154,7 +197,15 @@ def ground_contact(
     height = wp.dot(normal, pos_ned - ground_ned)
     for point in range(model.point_count):
         arm_frd = contact_point_frd(model, point)
-        depth = -height - wp.dot(normal, r_ned_from_frd * arm_frd)
+        depth = -height - wp.dot(around.normal_ned, r_ned_from_frd * arm_frd)
+        if around.is_near_solid == 1:
+            normal = around.normal_ned
+            surface = wp.vec3(around.leg_normal_x[point], around.leg_normal_y[point], around.leg_normal_z[point])
+            end_ned = pos_ned - around.origin_ned + r_ned_from_frd * arm_frd
+            leg_depth = around.leg_offset_m[point] - wp.dot(surface, end_ned)
+            if leg_depth > depth:
+                depth = leg_depth
+                normal = surface
         if depth > 0.0:
             point_vel_ned = vel_ned + r_ned_from_frd * wp.cross(omega_frd, arm_frd)
             normal_speed = wp.dot(normal, point_vel_ned)

@@ -17,13 +17,14 @@ from sim.bodies.contact import (
     FootSlip,
     Surroundings,
     ground_contact,
+    look_along_legs,
     look_around,
     obstacle_force,
 )
 from sim.bodies.multirotor_model import MultirotorModel
 from sim.bodies.rigid_body import held, hull_drag, lag_gain, moved, rested, truth_of
 from sim.truth import Truth
-from sim.world.world import World
+from sim.world.world import World, surface_height
 
 wp.set_module_options({"enable_backward": False})
 
@@ -71,6 +72,7 @@ class StepInputs:
     lift_ratio: float  # factor on thrust from ground effect; 0: broken rotors
     wind_ned: wp.vec3  # [m/s]
     around: Surroundings
+    height_agl_m: float  # of the centre of gravity over the ground or roof below
     rotor_inertia_rate: float  # [kg m²/s] rotor inertia over dt
     dt: float  # [s] substep
 
@@ -182,7 +184,7 @@ def contact_near(
 ) -> ContactForce:
     """Force of whatever is near over a step; nothing is near: none."""
     contact = ContactForce()
-    if around.is_near_ground == 1:
+    if around.is_near_ground + around.is_near_solid > 0:
         contact = ground_contact(
             model, around, body.pos_ned, body.vel_ned, r_ned_from_frd, body.omega_frd, body.foot_slip, dt
         )
@@ -232,7 +234,7 @@ def _substep(model: MultirotorModel, body: BodyState, inputs: StepInputs) -> Bod
     wrench = air_wrench(model, body, inputs, r_frd_from_ned)
     force_frd = wrench.force_frd
     torque_frd = wrench.torque_frd
-    if around.is_near_ground + around.is_near_obstacle > 0:
+    if around.is_near_ground + around.is_near_obstacle + around.is_near_solid > 0:
         contact = contact_near(model.contact, body, around, r_ned_from_frd, dt)
         force_frd += r_frd_from_ned * contact.force_ned
         torque_frd += contact.torque_frd
@@ -256,13 +258,18 @@ def step_inputs(
     inputs.dt = dt
     inputs.wind_ned = wind_ned
     inputs.around = look_around(world, model.contact, body.pos_ned)
+    inputs.height_agl_m = inputs.around.height_agl_m
+    if world.solids.count > 0:
+        inputs.height_agl_m = -body.pos_ned[2] - surface_height(world, body.pos_ned)
+        rot = wp.quat_to_matrix(body.q_ned_from_frd)
+        inputs.around = look_along_legs(world, model.contact, inputs.around, rot)
     inputs.density_ratio = density_ratio(model, body.pos_ned[2])
     inputs.rotor_inertia_rate = model.rotor_inertia_kg_m2 / dt
     inputs.gain_up = lag_gain(model.spin_up_time_s, dt)
     inputs.gain_down = lag_gain(model.spin_down_time_s, dt)
     if body.is_crashed == 0:
         inputs.rotor_target = rotor_targets(model, command, body.battery_voltage_v)
-        inputs.lift_ratio = ground_effect(model.rotor_radius_m, inputs.around.height_agl_m + model.rotor_height_m)
+        inputs.lift_ratio = ground_effect(model.rotor_radius_m, inputs.height_agl_m + model.rotor_height_m)
     return inputs
 
 
@@ -296,7 +303,7 @@ def body_tick(model: MultirotorModel, body: BodyState, command: vec8, wind_ned: 
     if body.is_held == 1:
         return held_tick(body, TICK_S)
     inputs = step_inputs(model, body, command, wind_ned, world, _SUBSTEP_S)
-    body.height_agl_m = inputs.around.height_agl_m
+    body.height_agl_m = inputs.height_agl_m
     body.is_on_ground = 0
     accel_sum = wp.vec3()
     gyro_sum = wp.vec3()
@@ -317,7 +324,7 @@ def body_substep(model: MultirotorModel, body: BodyState, command: vec8, wind_ne
     if body.is_held == 1:
         return held_tick(body, _SUBSTEP_S)
     inputs = step_inputs(model, body, command, wind_ned, world, _SUBSTEP_S)
-    body.height_agl_m = inputs.around.height_agl_m
+    body.height_agl_m = inputs.height_agl_m
     body.is_on_ground = 0
     body = _substep(model, body, inputs)
     return drain_battery(model, body, inputs.density_ratio, _SUBSTEP_S)

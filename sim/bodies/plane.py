@@ -11,7 +11,7 @@ from common.geodesy import GRAVITY_M_S2
 from common.kernels import SUBSTEPS, TICK_S, vec8
 from sim.battery import discharged
 from sim.bodies.body import Body
-from sim.bodies.contact import ContactForce, Surroundings, look_around, obstacle_force
+from sim.bodies.contact import ContactForce, Surroundings, look_around, obstacle_force, over_solids
 from sim.bodies.plane_air import SEA_LEVEL_DENSITY_KG_M3, air_force, propeller_step
 from sim.bodies.plane_gear import touch_ground
 from sim.bodies.plane_model import PlaneModel, plane_model
@@ -79,7 +79,7 @@ def plane_inputs(model: PlaneModel, body: PlaneState, command: vec8, wind_ned: w
     """All that stays the same over the substeps of a tick; a plane that has crashed is left as it is."""
     inputs = PlaneInputs()
     inputs.wind_ned = wind_ned
-    inputs.around = look_around(world, model.contact, body.pos_ned)
+    inputs.around = over_solids(world, model.contact, look_around(world, model.contact, body.pos_ned))
     ratio = model.home_density_ratio * (1.0 + _DENSITY_LAPSE_PER_M * body.pos_ned[2])
     inputs.density = SEA_LEVEL_DENSITY_KG_M3 * ratio
     inputs.surface = body.surface

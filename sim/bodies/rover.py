@@ -21,7 +21,7 @@ from sim.bodies.rover_model import RoverModel, rover_model
 from sim.bodies.rover_wheels import WheelStep, steered_frd, wheel_step
 from sim.truth import Truth
 from sim.world.neighbours import Outline
-from sim.world.world import World, ground_height, ground_normal_ned
+from sim.world.world import World, ground_height, ground_normal_ned, surface_height
 
 wp.set_module_options({"enable_backward": False})
 
@@ -85,6 +85,8 @@ class DriveInputs:
 def ground_below(model: RoverModel, world: World, pos_ned: wp.vec3, rot: wp.mat33, wheel: int) -> wp.vec3:
     """The ground below a hub, ned [m]."""
     hub_ned = pos_ned + rot * wp.vec3(model.hub_x[wheel], model.hub_y[wheel], model.hub_z)
+    if world.solids.count > 0:
+        return wp.vec3(hub_ned[0], hub_ned[1], -surface_height(world, hub_ned))
     return wp.vec3(hub_ned[0], hub_ned[1], -ground_height(world, hub_ned[0], hub_ned[1]))
 
 

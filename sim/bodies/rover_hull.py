@@ -12,7 +12,7 @@ import warp as wp
 
 from sim.bodies.rover_model import RoverModel
 from sim.world.neighbours import neighbour_touched
-from sim.world.world import World, ground_height, obstacle_contact
+from sim.world.world import World, obstacle_contact, surface_height
 
 wp.set_module_options({"enable_backward": False})
 
@@ -125,7 +125,7 @@ def look_at_hull(
     `is_near`: an obstacle may be touched.
     """
     hull = HullContact()
-    ground_m = ground_height(world, pos_ned[0], pos_ned[1])
+    ground_m = surface_height(world, pos_ned)
     hull.height_agl_m = -pos_ned[2] - ground_m
     hull.normal_ned = normal_ned
     hull.ground_offset_m = ground_offset_m

@@ -33,9 +33,9 @@ _LOW_M = 3.0  # over ground: nearer it may be touched
 
 
 def _bare(world: WorldMap) -> World:
-    """Its ground and the other vehicles in it: all else that is solid is Bullet's."""
+    """What our legs and wheels stand on, and the other vehicles in it: all else that is solid is Bullet's."""
     bare = World()
-    bare.terrain, bare.neighbours = world.kernel.terrain, world.kernel.neighbours
+    bare.terrain, bare.neighbours, bare.solids = world.kernel.terrain, world.kernel.neighbours, world.kernel.solids
     return bare
 
 

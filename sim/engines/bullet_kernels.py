@@ -16,7 +16,7 @@ from sim.bodies.body import Body
 from sim.bodies.rigid_body import turned_by
 from sim.engines.bullet_body import BulletBody
 from sim.truth import Truth
-from sim.world.world import World, ground_height, world_at
+from sim.world.world import World, ground_height, surface_height, world_at
 
 wp.set_module_options({"enable_backward": False})
 
@@ -178,7 +178,7 @@ def _tick_kernels(body: Body, part: BulletBody) -> tuple[Any, Any]:
         if state.is_held == 1:
             states[i] = body_tick(models[i], state, commands[i], wind_ned[i], world)
         else:
-            state = at_tick_start(state, ground_height(world, state.pos_ned[0], state.pos_ned[1]))
+            state = at_tick_start(state, surface_height(world, state.pos_ned))
             begun, inputs = part_begin(models[i], state, commands[i], wind_ned[i], world)
             states[i] = begun
             all_inputs[i] = inputs

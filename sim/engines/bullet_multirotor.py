@@ -43,7 +43,8 @@ def _wrench(
     force_frd = wrench.force_frd
     torque_frd = wrench.torque_frd
     body.rotor_speed = wrench.speed
-    if inputs.around.is_near_ground + inputs.around.is_near_obstacle > 0:
+    around = inputs.around
+    if around.is_near_ground + around.is_near_obstacle + around.is_near_solid > 0:
         contact = contact_near(model.contact, body, inputs.around, rot, _SUBSTEP_S)
         force_frd += wp.transpose(rot) * contact.force_ned
         torque_frd += contact.torque_frd

@@ -34,6 +34,7 @@ class BulletWorld:
         self._boxes = [self._make_box(row) for row in world.boxes.rows]
         if world.walls.is_built:
             self._make_walls()
+        self._make_solids()
 
     def furnish(self, pos_ned: NDArray[Any], tick: int) -> None:
         """Puts there what is near vehicles, shape (vehicles, 3), and the boxes where they are at a tick."""
@@ -110,6 +111,19 @@ class BulletWorld:
             extents = [*half, 0.5 * (top + _DEEP_M)]
             shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=extents, physicsClientId=self._client)
             self._fix(shape, (north, west, up))
+
+    def _make_solids(self) -> None:
+        """The triangles of a world file, as they are."""
+        for part in self._map.solids.parts:
+            vertices = part.vertices_ned.astype(float) * np.array([1.0, -1.0, -1.0])
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_MESH,
+                vertices=vertices.tolist(),
+                indices=part.faces.ravel().tolist(),
+                flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
+                physicsClientId=self._client,
+            )
+            self._fix(shape, (0.0, 0.0, 0.0))
 
     def _fix(self, shape: int, place: tuple[float, float, float]) -> int:
         """A body that stays where it is."""

@@ -85,7 +85,7 @@ def push(
     wrench = air_wrench(model, body, inputs[i], r_frd_from_ned)
     force = wrench.force_frd
     torque = wrench.torque_frd
-    if around.is_near_ground + around.is_near_obstacle > 0:
+    if around.is_near_ground + around.is_near_obstacle + around.is_near_solid > 0:
         contact = contact_near(model.contact, body, around, r_ned_from_frd, _SUBSTEP_S)
         force += r_frd_from_ned * contact.force_ned
         torque += contact.torque_frd

@@ -24,6 +24,7 @@ from sim.sensors.shading import (
     with_haze,
 )
 from sim.sensors.skyline import Skyline, make_skyline
+from sim.sensors.solid_paint import SolidPaint, make_paint
 from sim.world.world import World, WorldMap
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -60,7 +61,7 @@ class Images:
 
     rgb: NDArray[np.uint8]  # (cameras, height, width, 3)
     depth_m: NDArray[np.float32]  # (cameras, height, width), along the optical axis; SKY_DEPTH_M for the sky
-    kind: NDArray[np.uint8]  # (cameras, height, width), SKY, GROUND, TRUNK, CROWN, WALL
+    kind: NDArray[np.uint8]  # (cameras, height, width), SKY, GROUND, TRUNK, CROWN, WALL, VEHICLE, SOLID
 
 
 @wp.func
@@ -83,6 +84,7 @@ def encoded(light: float) -> wp.uint8:
 def render_images(
     w: World,
     skyline: Skyline,
+    paint: SolidPaint,
     lenses: wp.array[Lens],
     samples: int,  # per side of a pixel
     rgb: wp.array4d[wp.uint8],
@@ -112,7 +114,7 @@ def render_images(
             normal = surface_normal_ned(w, hit, point)
             facing = wp.max(0.05, wp.abs(wp.dot(normal, dir_ned)))
             footprint = hit.t * 2.0 * lens.half_width / float(width) / float(samples) / wp.sqrt(facing)
-            albedo = surface_albedo(w, hit, point, normal, footprint)
+            albedo = surface_albedo(w, paint, hit, point, normal, footprint)
             is_away = wp.dot(normal, SUN_NED) <= 0.0
             is_shaded = is_away and hit.kind != CROWN  # light comes through leaves
             if not is_away:
@@ -140,7 +142,9 @@ class Renderer:
 
     def __init__(self, world: WorldMap, device: str = "cpu") -> None:
         self._world = world.kernel
+        self._seen = world  # kernels' structs do not keep their arrays alive
         self._skyline = make_skyline(world).kernel(device)
+        self._paint = make_paint(world.solids, device)
         self._device = device
 
     def prepare(self) -> None:
@@ -162,7 +166,7 @@ class Renderer:
         rgb = wp.empty((count, height, width, 3), dtype=wp.uint8, device=device)
         depth_m = wp.empty((count, height, width), dtype=wp.float32, device=device)
         kinds = wp.empty((count, height, width), dtype=wp.uint8, device=device)
-        inputs = [self._world, self._skyline, lenses, samples, rgb, depth_m, kinds]
+        inputs = [self._world, self._skyline, self._paint, lenses, samples, rgb, depth_m, kinds]
         wp.launch(render_images, dim=(count, height, width), inputs=inputs, device=device)
         return Images(rgb.numpy(), depth_m.numpy(), kinds.numpy())
 

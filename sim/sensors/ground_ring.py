@@ -17,11 +17,12 @@ from common.rotation import yaw_from_quat
 from sim.rig import Rig
 from sim.truth import Truth
 from sim.world.boxes import Box, box_middle, in_box_axes
+from sim.world.custom.solids import FLOOR, solids_hit
 from sim.world.growing import bucket_of
 from sim.world.neighbours import neighbour_box
 from sim.world.trees import Forest, Tree
 from sim.world.walls import slab
-from sim.world.world import World, WorldMap, ground_height, world_at
+from sim.world.world import World, WorldMap, ground_height, top_surface, world_at
 
 wp.set_module_options({"enable_backward": False})
 
@@ -33,6 +34,7 @@ _PER_SECTOR = wp.constant(RAYS_PER_SECTOR)
 _RAYS = wp.constant(SECTORS * RAYS_PER_SECTOR)
 _RAY_RAD = wp.constant(2.0 * math.pi / (SECTORS * RAYS_PER_SECTOR))
 _LOW_M = wp.constant(1.0)  # another vehicle that flies higher does not stand on the ground
+_LAYERS_M = wp.constant(wp.vec2(0.15, 0.5))  # above the ground, at which solids are looked for; guess
 _STREAM = wp.constant(203)  # of the rig's seeds
 _STD_M = wp.constant(0.02)  # for a noise of 1; Slamtec RPLIDAR S2 data sheet: 3 cm
 _MISSES = wp.constant(0.01)  # fraction of sectors without a return, for a noise of 1; guess
@@ -111,6 +113,20 @@ def add_trunks(forest: Forest, place: wp.vec2, heading: float, ranges_m: wp.arra
 
 
 @wp.func
+def add_solids(world: World, place: wp.vec2, heading: float, ranges_m: wp.array2d(dtype=float), i: int) -> None:
+    """Casts level rays at two heights over what the ring stands on; what can be driven up is none of its returns."""
+    up = top_surface(world, place[0], place[1])
+    for ray in range(_RAYS):
+        angle = heading + float(ray) * _RAY_RAD
+        dir_ned = wp.vec3(wp.cos(angle), wp.sin(angle), 0.0)
+        for layer in range(2):
+            height_m = wp.where(layer == 0, _LAYERS_M[0], _LAYERS_M[1])
+            hit = solids_hit(world.solids, wp.vec3(place[0], place[1], -up - height_m), dir_ned, RING_MAX_M)
+            if hit.face >= 0 and -hit.normal_ned[2] < FLOOR:
+                shorten(ranges_m, i, ray, hit.t)
+
+
+@wp.func
 def ring_ranges(
     world: World,
     place: wp.vec2,
@@ -144,6 +160,8 @@ def ring_ranges(
             if box.low - ground_height(world, box.north, box.east) < _LOW_M:
                 add_box(box, 0, place, heading, ranges_m, i)
     add_trunks(world.forest, place, heading, ranges_m, i)
+    if world.solids.count > 0:
+        add_solids(world, place, heading, ranges_m, i)
     if world.walls.is_built == 1:
         inner = world.walls.half_size_m
         if wp.max(wp.abs(place[0]), wp.abs(place[1])) > inner - RING_MAX_M:

@@ -1,4 +1,4 @@
-"""What a camera ray meets first: ground, a trunk, a crown, a wall, another vehicle, or the sky.
+"""What a camera ray meets first: ground, a trunk, a crown, a wall, a solid, another vehicle, or the sky.
 
 Exact for the world's shapes inside the map, like `sim.world.world.ray_hit`, and quicker by the skyline. Beyond the map
 the ground is taken as it continues from the edge. Asked for every pixel, and once more for its shadow.
@@ -7,6 +7,7 @@ the ground is taken as it continues from the edge. Asked for every pixel, and on
 import warp as wp
 
 from sim.sensors.skyline import BLOCK_BUCKETS, Skyline
+from sim.world.custom.solids import SolidHit, solids_hit
 from sim.world.neighbours import Neighbours, neighbour_ray_hit
 from sim.world.terrain import terrain_height, terrain_ray_hit
 from sim.world.trees import Forest, Tree, tree_ray_hit
@@ -22,6 +23,7 @@ CROWN = wp.constant(3)
 WALL = wp.constant(4)
 PERSON = wp.constant(5)  # drawn by the fast camera only
 VEHICLE = wp.constant(6)
+SOLID = wp.constant(7)  # of a world file
 
 RAY_MAX_M = wp.constant(4000.0)  # beyond it fog hides everything
 _NEVER = wp.constant(1.0e30)
@@ -35,8 +37,9 @@ class Hit:
     """The first thing a ray meets."""
 
     t: float  # [m] along the unit ray
-    kind: int  # SKY, GROUND, TRUNK, CROWN, WALL or VEHICLE
-    i_tree: int  # or which vehicle
+    kind: int  # SKY, GROUND, TRUNK, CROWN, WALL, VEHICLE or SOLID
+    i_tree: int  # or which vehicle, or which triangle of the solids
+    solid: SolidHit
 
 
 @wp.func
@@ -160,6 +163,22 @@ def first_hit(w: World, skyline: Skyline, origin_ned: wp.vec3, dir_ned: wp.vec3,
         hit = beyond_map(w, origin_ned, dir_ned, hit)
     if w.neighbours.count > 0:
         hit = neighbour_hit(w.neighbours, w.boxes.tick, origin_ned, dir_ned, hit)
+    if w.solids.count > 0:
+        hit = nearer_solid(w, origin_ned, dir_ned, hit)
+    return hit
+
+
+@wp.func
+def nearer_solid(w: World, origin_ned: wp.vec3, dir_ned: wp.vec3, known: Hit) -> Hit:
+    """The nearer of a known hit and the solids."""
+    solid = solids_hit(w.solids, origin_ned, dir_ned, known.t)
+    if solid.face < 0:
+        return known
+    hit = Hit()
+    hit.t = solid.t
+    hit.kind = SOLID
+    hit.i_tree = solid.face
+    hit.solid = solid
     return hit
 
 

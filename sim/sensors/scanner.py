@@ -20,6 +20,7 @@ from common.rng import draw_key
 from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
 from sim.rig import Rig
 from sim.world.boxes import Box, box_middle, in_box_axes
+from sim.world.custom.solids import FLOOR, Solids, solids_hit
 from sim.world.growing import bucket_of
 from sim.world.neighbours import neighbour_box
 from sim.world.trees import Forest, Tree
@@ -160,6 +161,26 @@ def add_box(
 
 
 @wp.func
+def add_solids(
+    solids: Solids, pos_ned: wp.vec3, heading: float, rise: wp.vec2, ranges_m: wp.array2d(dtype=float), i: int
+) -> None:
+    """Shortens the ranges of the sectors in which rays meet solids: three each at three heights; floors are ground."""
+    for ray in range(_BOX_RAYS * _SECTORS):
+        k = ray // _BOX_RAYS
+        angle = heading + _FIRST_RAD + (float(ray) + 0.5) * _SECTOR_RAD / float(_BOX_RAYS)
+        north = wp.cos(angle)
+        east = wp.sin(angle)
+        climb = rise[0] * north + rise[1] * east
+        dir_ned = wp.normalize(wp.vec3(north, east, -climb))
+        level = wp.length(wp.vec2(dir_ned[0], dir_ned[1]))
+        for height in range(-1, 2):
+            start_ned = pos_ned - wp.vec3(0.0, 0.0, float(height) * BAND_M)
+            hit = solids_hit(solids, start_ned, dir_ned, ranges_m[i, k] / level)
+            if hit.face >= 0 and -hit.normal_ned[2] < FLOOR:
+                ranges_m[i, k] = hit.t * level
+
+
+@wp.func
 def scan_ranges(
     world: World,
     pos_ned: wp.vec3,
@@ -194,6 +215,8 @@ def scan_ranges(
     for k in range(world.neighbours.count):
         if k != world.neighbours.i_own:
             add_box(neighbour_box(world.neighbours.rows[k], tick), 0, pos_ned, heading, rise, ranges_m, i)
+    if world.solids.count > 0:
+        add_solids(world.solids, pos_ned, heading, rise, ranges_m, i)
     for k in range(_SECTORS, _RANGES):
         up = _ELEVATIONS[k - _SECTORS]
         dir_ned = wp.quat_rotate(q_ned_from_level, wp.vec3(wp.cos(up), 0.0, -wp.sin(up)))

@@ -8,7 +8,8 @@ from math import cos, radians, sin
 
 import warp as wp
 
-from sim.sensors.ray import CROWN, GROUND, TRUNK, VEHICLE, WALL, Hit, smooth_normal_ned
+from sim.sensors.ray import CROWN, GROUND, SOLID, TRUNK, VEHICLE, WALL, Hit, smooth_normal_ned
+from sim.sensors.solid_paint import SolidPaint, solid_albedo
 from sim.world.neighbours import neighbour_contact
 from sim.world.trees import Tree
 from sim.world.world import World
@@ -162,11 +163,15 @@ def surface_normal_ned(w: World, hit: Hit, point_ned: wp.vec3) -> wp.vec3:
     elif hit.kind == VEHICLE:
         push = neighbour_contact(w.neighbours.rows[hit.i_tree], w.boxes.tick, point_ned, 1.0)
         normal = wp.vec3(push[0], push[1], push[2])
+    elif hit.kind == SOLID:
+        normal = hit.solid.normal_ned
     return normal
 
 
 @wp.func
-def surface_albedo(w: World, hit: Hit, point_ned: wp.vec3, normal_ned: wp.vec3, footprint_m: float) -> wp.vec3:
+def surface_albedo(
+    w: World, paint: SolidPaint, hit: Hit, point_ned: wp.vec3, normal_ned: wp.vec3, footprint_m: float
+) -> wp.vec3:
     """Fraction of the light that the surface hit sends back."""
     albedo = _CONCRETE
     if hit.kind == GROUND:
@@ -185,6 +190,8 @@ def surface_albedo(w: World, hit: Hit, point_ned: wp.vec3, normal_ned: wp.vec3, 
         albedo = _CONCRETE * (1.0 + 0.15 * stain)
     elif hit.kind == VEHICLE:
         albedo = _HULL
+    elif hit.kind == SOLID:
+        albedo = solid_albedo(paint, hit.solid.face, hit.solid.u, hit.solid.v)
     return albedo
 
 

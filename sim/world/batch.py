@@ -14,6 +14,9 @@ import warp as wp
 from common.warp_start import start_warp
 from sim.world.boxes import Box, Boxes, BoxesMap
 from sim.world.building import build, most_boxes
+from sim.world.custom.solid_parts import SolidPart, solid_parts
+from sim.world.custom.solids import SolidsMap
+from sim.world.custom.world_file import WorldFile
 from sim.world.growing import (
     COVERAGE,
     EMPTY_M,
@@ -81,6 +84,7 @@ class WorldBatch:
         growing.trees_per_ha_max = config.trees_per_ha if trees_per_ha_max is None else trees_per_ha_max
         growing.tree_height_limit_m = config.tree_height_max_m if tree_height_limit_m is None else tree_height_limit_m
         self._growing = growing
+        self.solids = SolidsMap(_parts(config))
         self._make_worlds()
         self._make_scratch()
         self._commands: list[Any] = []
@@ -137,7 +141,9 @@ class WorldBatch:
         kernel.forest = forest.kernel(self.device)
         kernel.walls = walls.kernel()
         kernel.boxes = boxes.kernel(self.device)
-        return WorldMap(self.config.model_copy(update=params | {"seed": seed}), terrain, forest, walls, kernel, boxes)
+        kernel.solids = self.solids.kernel(self.device)
+        config = self.config.model_copy(update=params | {"seed": seed})
+        return WorldMap(config, terrain, forest, walls, kernel, boxes, self.solids)
 
     def _make_worlds(self) -> None:
         """The `World` rows, whose arrays are slices of stores for all worlds."""
@@ -173,6 +179,7 @@ class WorldBatch:
             boxes.top_m = NO_OBSTACLE_M
             world = World()
             world.terrain, world.forest, world.walls, world.boxes = terrain, forest, walls, boxes
+            world.solids = self.solids.kernel(self.device)
             worlds.append(world)
         growing.worlds = wp.array(worlds, dtype=World, device=self.device)
 
@@ -223,6 +230,15 @@ def grown_world(config: WorldConfig, seed: int, device: str = "cpu") -> WorldMap
     batch = WorldBatch(config, 1, device)
     batch.grow_all(seed)
     return batch.map(0)
+
+
+def _parts(config: WorldConfig) -> tuple[SolidPart, ...]:
+    """What stands in every world of a batch: its positions without a height are on the home plane."""
+    if not isinstance(config, WorldFile):
+        return ()
+    if config.heightmap is not None:
+        raise ValueError("worlds that are grown in batches make their own ground: leave the heightmap out")
+    return solid_parts(config, TerrainMap(np.zeros((3, 3), np.float32), config.size_m))
 
 
 def _spacing_m(trees_per_ha: float) -> float:

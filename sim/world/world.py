@@ -6,15 +6,17 @@ World frame ned with its origin at home; ground heights are metres up from the h
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Self
 
 import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from common.warp_start import start_warp
 from sim.world.boxes import Boxes, BoxesMap, boxes_contact, boxes_ray_hit, no_boxes
+from sim.world.custom.heightmap import heightmap_terrain
+from sim.world.custom.solid_parts import solid_parts
+from sim.world.custom.solids import Solids, SolidsMap, solids_contact, solids_height, solids_ray_hit
+from sim.world.custom.world_file import WorldFile
 from sim.world.neighbours import Neighbours, neighbours_contact, neighbours_ray_hit
 from sim.world.terrain import (
     FloatArray,
@@ -27,10 +29,14 @@ from sim.world.terrain import (
 )
 from sim.world.trees import Forest, ForestMap, forest_contact, forest_ray_hit, make_trees
 from sim.world.walls import Walls, WallsMap, walls_contact, walls_ray_hit
+from sim.world.world_config import WorldConfig
 
 wp.set_module_options({"enable_backward": False})
 
-MAX_CELLS = 1024  # per side: 4 MB of heights
+__all__ = [
+    "World", "WorldConfig", "WorldMap", "build_world", "ground_height", "ground_normal_ned", "obstacle_contact",
+    "ray_hit", "shared_world", "surface_height", "top_surface", "world_at",
+]  # fmt: skip
 
 
 @wp.struct
@@ -42,6 +48,7 @@ class World:
     walls: Walls
     boxes: Boxes
     neighbours: Neighbours  # other vehicles; as many for each vehicle as it is not alone
+    solids: Solids  # of a world file
 
 
 @wp.func
@@ -65,10 +72,28 @@ def ground_normal_ned(w: World, north: float, east: float) -> wp.vec3:
 
 
 @wp.func
-def ray_hit(w: World, origin_ned: wp.vec3, dir_ned: wp.vec3, max_m: float) -> float:
-    """Distance [m] along a ray to the first ground, trunk, crown, wall, box or other vehicle; `max_m` if none.
+def surface_height(w: World, pos_ned: wp.vec3) -> float:
+    """Height above the home plane [m] of what is straight below a point: a roof, or the ground, wherever the point."""
+    height = ground_height(w, pos_ned[0], pos_ned[1])
+    if w.solids.count > 0:
+        height = wp.max(height, solids_height(w.solids, pos_ned))
+    return height
 
-    From inside one it is 0.
+
+@wp.func
+def top_surface(w: World, north: float, east: float) -> float:
+    """Height above the home plane [m] of the highest that a vehicle can be put on: a roof, or the ground."""
+    if w.solids.count == 0:
+        return ground_height(w, north, east)
+    above_m = wp.max(w.solids.top_m, w.terrain.ground_max_m) + 1.0
+    return surface_height(w, wp.vec3(north, east, -above_m))
+
+
+@wp.func
+def ray_hit(w: World, origin_ned: wp.vec3, dir_ned: wp.vec3, max_m: float) -> float:
+    """Distance [m] along a ray to the first ground, trunk, crown, wall, box, solid or other vehicle; `max_m` if none.
+
+    From inside one it is 0, but for solids, which are surfaces.
 
     Args:
         w: the world.
@@ -80,12 +105,16 @@ def ray_hit(w: World, origin_ned: wp.vec3, dir_ned: wp.vec3, max_m: float) -> fl
     forest = forest_ray_hit(w.forest, origin_ned, dir_ned, ground)
     wall = walls_ray_hit(w.walls, origin_ned, dir_ned, forest)
     box = boxes_ray_hit(w.boxes, origin_ned, dir_ned, wall)
+    if w.solids.count > 0:
+        box = solids_ray_hit(w.solids, origin_ned, dir_ned, box)
     return neighbours_ray_hit(w.neighbours, w.boxes.tick, origin_ned, dir_ned, box)
 
 
 @wp.func
 def obstacle_contact(w: World, pos_ned: wp.vec3, radius: float) -> wp.vec4:
-    """Deepest contact of a sphere with a trunk, crown, wall, box or other vehicle; the ground is no obstacle.
+    """Deepest contact of a sphere with a trunk, crown, wall, box, solid or other vehicle.
+
+    The ground is no obstacle, nor are the floors of solids.
 
     Args:
         w: the world.
@@ -105,63 +134,11 @@ def obstacle_contact(w: World, pos_ned: wp.vec3, radius: float) -> wp.vec4:
     neighbour = neighbours_contact(w.neighbours, w.boxes.tick, pos_ned, radius)
     if neighbour[3] > contact[3]:
         contact = neighbour
+    if w.solids.count > 0:
+        solid = solids_contact(w.solids, pos_ned, radius)
+        if solid[3] > contact[3]:
+            contact = solid
     return contact
-
-
-class WorldConfig(BaseModel):
-    """What a world is made from. The defaults keep every tree within 120 m of home below 15 m above the home plane."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    seed: int = Field(default=1, ge=0, le=2**32 - 1)
-    """Seed of terrain and trees: same seed and settings, same bytes."""
-    size_m: float = Field(default=1000.0, ge=50.0, le=10_000.0)
-    """Side of the square map centred on home [m]."""
-    cell_m: float = Field(default=4.0, ge=0.5, le=50.0)
-    """Distance between grid points of the terrain [m], rounded so that the map holds whole cells."""
-    hill_height_m: float = Field(default=12.0, ge=0.0, le=300.0)
-    """Bound of the hills above and valleys below home [m]; 0 makes a plain."""
-    hill_wavelength_m: float = Field(default=250.0, ge=20.0, le=5_000.0)
-    """Wavelength of the broadest hills [m]."""
-    octaves: int = Field(default=6, ge=1, le=8)
-    """Layers of hills, each half the wavelength of the one before."""
-    clearing_radius_m: float = Field(default=20.0, ge=0.0, le=1_000.0)
-    """Radius round home that is exactly level and free of trees [m]."""
-    clearing_blend_m: float = Field(default=230.0, ge=1.0, le=5_000.0)
-    """Width of the ring round the clearing in which the hills grow to full height [m]."""
-    trees_per_ha: float = Field(default=60.0, ge=0.0, le=1_000.0)
-    """Trees per hectare outside the clearing; 0 plants none."""
-    treeless_radius_m: float = Field(default=0.0, ge=0.0, le=1_000.0)
-    """Radius round home that is free of trees, if it is more than the clearing's, hills or not [m]; not in worlds grown
-    in batches."""
-    tree_height_min_m: float = Field(default=5.0, ge=1.0, le=60.0)
-    """Height of the lowest trees [m]."""
-    tree_height_max_m: float = Field(default=10.0, ge=1.0, le=60.0)
-    """Height of the highest trees [m]."""
-    has_walls: bool = False
-    """Whether walls stand along the edges of the map."""
-    wall_height_m: float = Field(default=10.0, ge=1.0, le=200.0)
-    """Height of the walls above the highest ground at the edges of the map [m]."""
-    wall_count: int = Field(default=0, ge=0, le=100)
-    """Free-standing walls, a fifth of them kerbs, scattered over the map; in worlds grown in batches alone."""
-    mover_count: int = Field(default=0, ge=0, le=20)
-    """Obstacles that run to and fro, in a car park along its aisle; in worlds grown in batches alone."""
-    spot_count: int = Field(default=0, ge=0, le=20)
-    """Spots in each of the two rows of a car park beside home, 0: none; in worlds grown in batches alone."""
-
-    @property
-    def has_boxes(self) -> bool:
-        """Whether walls, movers or a car park stand in it: it is grown in a batch then."""
-        return self.wall_count + self.mover_count + self.spot_count > 0
-
-    @model_validator(mode="after")
-    def _fits(self) -> Self:
-        cells = self.size_m / self.cell_m
-        if cells > MAX_CELLS:
-            raise ValueError(f"size_m / cell_m makes {cells:.0f} cells per side, at most {MAX_CELLS} are allowed")
-        if self.tree_height_min_m > self.tree_height_max_m:
-            raise ValueError("tree_height_min_m is larger than tree_height_max_m")
-        return self
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -174,6 +151,7 @@ class WorldMap:
     walls: WallsMap
     kernel: World
     boxes: BoxesMap = field(default_factory=lambda: BoxesMap(no_boxes()))
+    solids: SolidsMap = field(default_factory=SolidsMap)
 
     @property
     def heights(self) -> NDArray[np.float32]:
@@ -193,6 +171,10 @@ class WorldMap:
         """Unit normals of the ground pointing up (z < 0), shape (..., 3)."""
         return self.terrain.normal_ned(north, east)
 
+    def surface(self, north: ArrayLike, east: ArrayLike) -> FloatArray:
+        """Height above the home plane [m] of the highest that one can stand on: ground or a solid."""
+        return np.maximum(self.height(north, east), self.solids.height(np.asarray(north), np.asarray(east)))
+
     def ray_hit(self, origin_ned: ArrayLike, dir_ned: ArrayLike, max_m: float, tick: int = 0) -> float:
         """Distance [m] along a ray to the first ground, trunk, crown, wall or box; `max_m` if none, 0 from inside.
 
@@ -205,7 +187,7 @@ class WorldMap:
         origin, direction = np.asarray(origin_ned, np.float64), np.asarray(dir_ned, np.float64)
         ground = self.terrain.ray_hit(origin, direction, max_m)
         wall = self.walls.ray_hit(origin, direction, self.forest.ray_hit(origin, direction, ground))
-        return self.boxes.ray_hit(origin, direction, wall, tick)
+        return self.solids.ray_hit(origin, direction, self.boxes.ray_hit(origin, direction, wall, tick))
 
     def obstacle_distance(self, pos_ned: ArrayLike, tick: int = 0) -> FloatArray:
         """Distance [m] to the nearest trunk, crown, wall or box, negative inside, inf for none.
@@ -217,6 +199,7 @@ class WorldMap:
         pos = np.asarray(pos_ned, np.float64)
         flat = pos.reshape(-1, 3)
         nearest = np.minimum(self.forest.distance(flat), self.walls.distance(flat))
+        nearest = np.minimum(nearest, self.solids.distance(flat))
         return np.minimum(nearest, self.boxes.distance(flat, tick)).reshape(pos.shape[:-1])
 
     def clearance(self, pos_ned: ArrayLike) -> FloatArray:
@@ -232,16 +215,50 @@ class WorldMap:
 def shared_world(world: WorldMap, neighbours: Neighbours) -> WorldMap:
     """The same world as one of several vehicles reads it: with the others in it."""
     kernel = World()
-    for part in ("terrain", "forest", "walls", "boxes"):
+    for part in ("terrain", "forest", "walls", "boxes", "solids"):
         setattr(kernel, part, getattr(world.kernel, part))
     kernel.neighbours = neighbours
     return replace(world, kernel=kernel)
 
 
 def build_world(config: WorldConfig | None = None, device: str = "cpu") -> WorldMap:
-    """The world of a configuration, its kernel arrays on `device`."""
+    """The world of a configuration, its kernel arrays on `device`.
+
+    Raises:
+        WorldError: a file that a `WorldFile` names cannot be used.
+    """
     start_warp()
     config = config or WorldConfig()
+    terrain = _terrain(config)
+    if isinstance(config, WorldFile) and config.heightmap is not None:
+        config = config.model_copy(update={"size_m": terrain.size_m, "cell_m": terrain.size_m / terrain.cells})
+    trees = make_trees(
+        config.seed,
+        terrain,
+        config.trees_per_ha,
+        config.tree_height_min_m,
+        config.tree_height_max_m,
+        max(config.clearing_radius_m, config.treeless_radius_m),
+    )
+    forest = ForestMap(trees, terrain.size_m)
+    heights = terrain.heights
+    edges = np.concatenate([heights[0], heights[-1], heights[:, 0], heights[:, -1]])
+    walls = WallsMap(config.has_walls, 0.5 * terrain.size_m, float(edges.max()) + config.wall_height_m)
+    boxes = BoxesMap(no_boxes())
+    solids = SolidsMap(solid_parts(config, terrain) if isinstance(config, WorldFile) else ())
+    kernel = World()
+    kernel.terrain = terrain.kernel(device)
+    kernel.forest = forest.kernel(device)
+    kernel.walls = walls.kernel()
+    kernel.boxes = boxes.kernel(device)
+    kernel.solids = solids.kernel(device)
+    return WorldMap(config, terrain, forest, walls, kernel, boxes, solids)
+
+
+def _terrain(config: WorldConfig) -> TerrainMap:
+    """The ground: as a heightmap has it, or grown."""
+    if isinstance(config, WorldFile) and config.heightmap is not None:
+        return heightmap_terrain(config.heightmap)
     cells = max(2, round(config.size_m / config.cell_m))
     heights = make_heights(
         config.seed,
@@ -253,21 +270,4 @@ def build_world(config: WorldConfig | None = None, device: str = "cpu") -> World
         config.clearing_radius_m,
         config.clearing_blend_m,
     )
-    terrain = TerrainMap(heights, config.size_m)
-    trees = make_trees(
-        config.seed,
-        terrain,
-        config.trees_per_ha,
-        config.tree_height_min_m,
-        config.tree_height_max_m,
-        max(config.clearing_radius_m, config.treeless_radius_m),
-    )
-    forest = ForestMap(trees, config.size_m)
-    edges = np.concatenate([heights[0], heights[-1], heights[:, 0], heights[:, -1]])
-    walls = WallsMap(config.has_walls, 0.5 * config.size_m, float(edges.max()) + config.wall_height_m)
-    kernel = World()
-    kernel.terrain = terrain.kernel(device)
-    kernel.forest = forest.kernel(device)
-    kernel.walls = walls.kernel()
-    kernel.boxes = BoxesMap(no_boxes()).kernel(device)
-    return WorldMap(config, terrain, forest, walls, kernel)
+    return TerrainMap(heights, config.size_m)

@@ -18,6 +18,8 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 # Where an extra may be imported; everywhere else is what a plain install has.
 PLACES = {
     "viewer": ("mission/view",),
+    "worlds": ("mission/view", "mission/world", "sim/world/custom/mesh_files.py"),
+    "geo": ("sim/world/custom/heightmap.py",),
     "tune": (
         *("autopilot/control/margins.py", "autopilot/estimator/derive.py"),
         *("autopilot/vehicles/multirotor/tuning.py", "autopilot/vehicles/rover/tuning.py"),
@@ -37,6 +39,7 @@ OWN_ENVIRONMENTS = ("tests/mavproxy", "tests/mavsdk3", "tests/dronekit")
 # Distributions whose module has another name.
 NAMED_OTHERWISE = {
     "cosmic_ray": "cosmic-ray",
+    "PIL": "pillow",
     "cv2": "opencv-python-headless",
     "pydantic_core": "pydantic",  # its own half
     "serial": "pyserial",

@@ -41,6 +41,8 @@ RUN_BY_OTHERS = (
     *(
         f"{HONEYGUIDE} {name} " for name in ("demonstrate", "play", "drive")
     ),  # tests/unit/mission/train/test_task_commands.py
+    f"{HONEYGUIDE} world ",  # tests/unit/mission/world
+    f"{HONEYGUIDE} fly --world ",  # tests/unit/mission/world/test_worked_example.py
     f"{HONEYGUIDE} replay ",  # tests/unit/mission/view/test_replay.py
     f"{HONEYGUIDE} benchmark ",  # tests/unit/mission/follow/test_benchmark.py
     f"{HONEYGUIDE} companion ",  # tests/system/companion/test_companion.py

@@ -21,8 +21,11 @@ from sim.sensors.fast_camera.light import STRIPS, light_corners, light_strips, p
 from sim.sensors.fast_camera.optics import Optics, expose
 from sim.sensors.fast_camera.prepare import prepare_views
 from sim.sensors.fast_camera.rows import Outputs, draw_rows
+from sim.sensors.fast_camera.solid_rows import draw_solids
 from sim.sensors.fast_camera.solids import Sights, Solid
+from sim.sensors.solid_paint import make_paint
 from sim.world.clothes import Clothes, usual_clothes
+from sim.world.custom.solids import SolidsMap
 from sim.world.people import Person
 from sim.world.trees import CROWN_RADIUS_FRACTION
 from sim.world.world import World, WorldConfig, WorldMap
@@ -42,6 +45,10 @@ class Worlds(Protocol):
     @property
     def config(self) -> WorldConfig:
         """Of all of them."""
+
+    @property
+    def solids(self) -> SolidsMap:
+        """Of a world file, the same in all of them."""
 
     @property
     def kernels(self) -> Any:
@@ -71,8 +78,8 @@ class QuickCamera:
         optics: array of `sim.sensors.fast_camera.optics.Optics`, likewise; shape (0,) without optics.
         rgb: uint8, (count, height, width, 3).
         depth_m: float32, (count, height, width), along the optical axis; `sim.sensors.camera.SKY_DEPTH_M` for the sky.
-        kind: uint8, (count, height, width): SKY, GROUND, TRUNK, CROWN, WALL, PERSON, VEHICLE of `sim.sensors.ray`. From
-            inside a tree or person all pixels are that, at depth 0.
+        kind: uint8, (count, height, width): SKY, GROUND, TRUNK, CROWN, WALL, PERSON, VEHICLE, SOLID of
+            `sim.sensors.ray`. From inside a tree or person all pixels are that, at depth 0.
         i_world: array of int, shape (count,).
     """
 
@@ -92,8 +99,7 @@ class QuickCamera:
         threads: int = 1,
         device: str = "cpu",
     ) -> None:
-        config = worlds.config
-        self._seen = worlds  # kernels' structs do not keep their arrays alive
+        config, self._seen = worlds.config, worlds  # kernels' structs do not keep their arrays alive
         if isinstance(worlds, WorldMap):
             self._worlds = wp.array([worlds.kernel], dtype=World, device=device)
         else:
@@ -108,10 +114,7 @@ class QuickCamera:
         self._everyone = wp.full(count, value=True, dtype=wp.bool, device=device)
         self.optics = wp.zeros(count if has_optics else 0, dtype=Optics, device=device)
         perfect = (wp.zeros_like(self.rgb), wp.zeros_like(self.depth_m)) if has_optics else (self.rgb, self.depth_m)
-        outputs = Outputs()
-        outputs.rgb, outputs.depth_m, outputs.kind = perfect[0].flatten(), perfect[1].flatten(), self.kind.flatten()
-        outputs.front = wp.zeros(count * height * width, dtype=wp.int32, device=device)
-        outputs.width, outputs.height = width, height
+        outputs = _outputs(*perfect, self.kind)
         views = wp.zeros(count, dtype=View, device=device)
         columns = _columns(count, width, range_m, device)
         self._who = _people(people, clothes, count, device)
@@ -126,6 +129,10 @@ class QuickCamera:
             (lay_columns, (columns.room,), [ground, views, chosen, columns]),
             (draw_rows, (height,), drawn),
         ]
+        if worlds.solids.parts:
+            self._paint = make_paint(worlds.solids, device)
+            shaded = [self._worlds, self.i_world, self._paint, paints, views, chosen, range_m, outputs]
+            passes.append((draw_solids, (height,), shaded))
         if has_optics:
             passes.append((expose, (height,), [self.lenses, chosen, self.optics, size, *images]))
         self._workers = Workers(count, threads)
@@ -161,6 +168,15 @@ def _recorded(a_pass: _Pass, chosen: Any, first: int, count: int, device: str) -
     kernel, dim, inputs = a_pass
     i_chosen = 1 + next(k for k, value in enumerate(inputs) if value is chosen)
     return wp.launch(kernel, (count, *dim), [first, *inputs], device=device, record_cmd=True), i_chosen
+
+
+def _outputs(rgb: Any, depth_m: Any, kind: Any) -> Any:
+    """The images as the rows write them."""
+    outputs = Outputs()
+    outputs.rgb, outputs.depth_m, outputs.kind = rgb.flatten(), depth_m.flatten(), kind.flatten()
+    outputs.front = wp.zeros(kind.size, dtype=wp.int32, device=kind.device)
+    outputs.height, outputs.width = kind.shape[1:]
+    return outputs
 
 
 def _worlds_of(i_world: Any, count: int, world_count: int) -> Any:

@@ -1,0 +1,1 @@
+"""Worlds of one's own: read from files, looked at and exported."""
