@@ -41,9 +41,11 @@ def write_html(recording: Recording, world: WorldMap, target: Path, title: str) 
     Raises:
         OSError: it cannot be written.
     """
-    page = files("mission.view").joinpath("replay.html").read_text(encoding="utf-8")
+    page, webgl = (
+        files("mission.view").joinpath(name).read_text(encoding="utf-8") for name in ("replay.html", "webgl.js")
+    )
     data = json.dumps(page_data(recording.every(STRIDE), world, title)).replace("</", "<\\/")
-    write_whole(target, page.replace("/*DATA*/", data).encode())
+    write_whole(target, page.replace("/*WEBGL*/", webgl).replace("/*DATA*/", data).encode())
 
 
 def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
@@ -57,19 +59,19 @@ def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
         "sun_ned": shapes.SUN_NED.tolist(),
         "heading_rad": float(yaw_rad(rows["q_ned_from_frd"][:1].astype(float))[0]),
         "has_owner": recording.has_owner,
-        "ground": _mesh(shapes.ground(world, CELLS_MOST)),
-        "walls": None if (walls := shapes.walls(world)) is None else _mesh(walls),
+        "ground": mesh_data(shapes.ground(world, CELLS_MOST)),
+        "walls": None if (walls := shapes.walls(world)) is None else mesh_data(walls),
         **_trees(world),
-        "vehicle": _mesh(shape.body),
-        "blade": _mesh(shape.blade),
-        "boxes": None if (boxes := shapes.boxes(world, movers=False)) is None else _mesh(boxes),
+        "vehicle": mesh_data(shape.body),
+        "blade": mesh_data(shape.blade),
+        "boxes": None if (boxes := shapes.boxes(world, movers=False)) is None else mesh_data(boxes),
         "movers": _movers(recording, world),
         "others": [_other(other) for other in recording.others],
-        "wheel": _mesh(shape.wheels[0]) if shape.drives else None,
+        "wheel": mesh_data(shape.wheels[0]) if shape.drives else None,
         "wheel_hubs": _array(shape.wheel_hubs),
         "is_steered": list(shape.is_steered),
         "away_m": 3.0 if shape.drives else 7.0,
-        "person": _mesh(shapes.person(STATURE_M)),
+        "person": mesh_data(shapes.person(STATURE_M)),
         "hubs": _array(shape.hubs),
         "spins": list(shape.spins),
         "path_ned": _array(recording.path_ned) if len(recording.path_ned) > 1 else None,
@@ -85,7 +87,8 @@ def _array(values: NDArray[Any]) -> Json:
     return {"type": kind, "data": b64encode(values.astype(f"<{kind}").tobytes()).decode()}
 
 
-def _mesh(mesh: shapes.Mesh) -> Json:
+def mesh_data(mesh: shapes.Mesh) -> Json:
+    """Triangles for the page."""
     return {name: _array(getattr(mesh, name)) for name in ("vertices", "faces", "colours")}
 
 
@@ -95,8 +98,8 @@ def _trees(world: WorldMap) -> Json:
         return {"trunks": None}
     bark = np.broadcast_to(np.array(shapes.BARK, np.uint8), forest.crown_colours.shape)
     return {
-        "trunk": _mesh(shapes.trunk()),
-        "ball": _mesh(shapes.ball()),
+        "trunk": mesh_data(shapes.trunk()),
+        "ball": mesh_data(shapes.ball()),
         "trunks": {"place": _array(forest.trunk_ned), "size": _array(forest.trunk_size), "tint": _array(bark)},
         "crowns": {
             "place": _array(forest.crown_ned),
@@ -121,7 +124,7 @@ def _movers(recording: Recording, world: WorldMap) -> list[Json]:
     movers = shapes.moving_boxes(world)
     places = np.array([world.boxes.middle(tick) for tick in ticks]) if movers else None
     return [
-        {"mesh": _mesh(mesh), "place": _array(places[:, i].astype(np.float32))}
+        {"mesh": mesh_data(mesh), "place": _array(places[:, i].astype(np.float32))}
         for i, mesh in movers
         if places is not None
     ]
@@ -134,7 +137,7 @@ def _other(recording: Recording) -> Json:
     turning += zip(shape.wheels, shape.wheel_hubs, strict=True)
     parts = [shapes.Mesh((mesh.vertices + hub).astype(np.float32), mesh.faces, mesh.colours) for mesh, hub in turning]
     return {
-        "mesh": _mesh(shapes.joined([shape.body, *parts])),
+        "mesh": mesh_data(shapes.joined([shape.body, *parts])),
         "place": _array(recording.rows["pos_ned"]),
         "attitude": _array(recording.rows["q_ned_from_frd"]),
     }
