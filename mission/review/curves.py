@@ -38,6 +38,8 @@ class Panel:
     bounds: tuple[tuple[float, str], ...] = ()  # levels drawn across, with their meaning
     least_span: float = 0.0  # of the vertical axis: noise on a quantity that stands still does not fill the plot
     starts_at_zero: bool = False
+    is_of_flight: bool = False  # the vertical axis fits what happened in the air: before, it may be anything
+    wraps: bool = False  # an angle: its jump by a turn is no line
     ceiling: float | None = None  # the vertical axis ends there at the latest
 
 

@@ -62,12 +62,12 @@ def index_page(rows: Sequence[IndexRow], title: str) -> bytes:
         f"<th>{name}</th>" for name in ("", "flight", "checks", "margin", "result", "time", "way", "what is wrong")
     )
     failed = sum(row.failed > 0 for row in rows)
-    told = f"{len(rows)} flights" + (f", {failed} with failed checks" if failed else "")
+    summary = f"{len(rows)} flights" + (f", {failed} with failed checks" if failed else "")
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{escape(title)}</title><style>{page_part('review.css')}</style></head><body>"
-        f'<header><h1>{escape(title)}</h1><span class="soft">{told}, the worst first</span></header>'
+        f'<header><h1>{escape(title)}</h1><span class="soft">{summary}, the worst first</span></header>'
         f'<main><div class="card scroll"><table id="index"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
         "</div></main></body></html>\n"
     ).encode()

@@ -23,7 +23,7 @@ GAP_MAX_S = 60.0  # in a damaged log, what lies farther away is of no such time;
 STRAY_RANGES = 3.0  # beyond the middle 98 %, in its own widths; guess
 CLOCK_TOPICS = ("sensor_combined", "vehicle_attitude", "vehicle_local_position")
 LEVELS = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
-_ESCAPES = re.compile(r"\x1b?\[[0-9;]*m|[\x00-\x1f\x7f]")
+_ESCAPES = re.compile(r"\x1b\[[0-9;]*m|\[[0-9;]+m|[\x00-\x1f\x7f]")
 
 
 class ReviewError(ValueError):
@@ -194,8 +194,8 @@ def _bounds_us(raw: dict[tuple[str, int], dict[str, Rows]], begun_us: int, *, is
         steady = max(np.split(steady, cuts), key=len)
         return int(steady[0]), int(steady[-1])
     end_us = max(int(each.max()) for each in times.values())
-    is_told = 0 < begun_us <= steady[0]
-    return begun_us if is_told else int(steady[0]), end_us
+    is_given = 0 < begun_us <= steady[0]
+    return begun_us if is_given else int(steady[0]), end_us
 
 
 def _topic(name: str, columns: dict[str, Rows], start_us: int, end_us: int, *, is_damaged: bool) -> Topic:

@@ -9,6 +9,7 @@ import numpy as np
 from common.airframe import load_airframe
 from mission.review.curves import ArrayPool, Curve, Panel, Rows
 from mission.review.flight_review import FlightReview
+from mission.review.panels.motion import TRUE
 from mission.review.timeline import Span
 from mission.review.vibration import Spectrum
 from mission.view import shapes
@@ -71,7 +72,7 @@ def _flight(review: FlightReview, shift_s: float) -> Json:
             }
             for check in review.checks
         ],
-        "has_defaults": flight.has_defaults,
+        "has_defaults": flight.has_defaults or flight.is_own,
         "parameters": review.changed_parameters[:PARAMETERS_MAX],
         "texts": [[round(each.time_s - shift_s, 2), each.level, each.text] for each in when.texts[:TEXTS_MAX]],
         "modes": _spans(when.modes, shift_s),
@@ -95,7 +96,8 @@ def _sections(pairs: Sequence[tuple[FlightReview, float]], pool: ArrayPool) -> l
         for number, (each, (_, shift)) in enumerate(zip(same, pairs, strict=True)):
             for panel in each.panels:
                 shown = panels.setdefault(panel.key, _panel(panel))
-                shown["curves"] += [_curve(curve, number, shift, pool) for curve in panel.curves]
+                compared = [curve for curve in panel.curves if len(pairs) == 1 or curve.name != TRUE]
+                shown["curves"] += [_curve(curve, number, shift, pool) for curve in compared]
         found.append(
             {
                 "key": section.key,
@@ -125,6 +127,8 @@ def _panel(panel: Panel) -> Json:
         "least_span": panel.least_span,
         "zero": panel.starts_at_zero,
         "ceiling": panel.ceiling,
+        "wraps": panel.wraps,
+        "of_flight": panel.is_of_flight,
         "curves": [],
     }
 
@@ -192,7 +196,7 @@ def _step(times_s: Rows) -> float:
 
 
 def _vehicle(review: FlightReview) -> Json:
-    """What the vehicle looks like: ours by its airframe, others as a quadrotor."""
+    """What the vehicle looks like: ours by its airframe, others as the plain one."""
     try:
         airframe = load_airframe(str(review.flight.info.get("airframe", PLAIN_AIRFRAME)))
     except (OSError, ValueError):

@@ -23,7 +23,7 @@ def review_page(reviews: Sequence[FlightReview], title: str) -> bytes:
         ("/*SCRIPTS*/", "\n".join(scripts)),
         ("/*DATA*/", data),
     ):
-        page = page.replace(mark, text, 1)
+        page = page.replace(mark, text)
     return page.encode()
 
 

@@ -16,6 +16,7 @@ PATH_KEY = "replay_path"  # of our logs' information
 MOMENTS_MAX = 3000
 MOMENT_S = 0.1  # no closer than this
 WAYPOINT_APART_M = 0.5
+REACH_M = 100_000.0  # a place farther from the track is none: a damaged row, or never set
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,7 @@ def track(flight: LoggedFlight, origin: GeoPoint | None = None) -> Track | None:
     times = _moments(time_s)
     at = np.stack([np.interp(times, time_s, pos[:, axis]) for axis in range(3)], axis=1)
     home, waypoints = _home(flight, own), _waypoints(flight, own)
+    waypoints = waypoints[np.linalg.norm(waypoints - at[0], axis=1) < REACH_M]
     return Track(
         times,
         at + shift,
@@ -100,7 +102,13 @@ def _gnss(flight: LoggedFlight, origin: GeoPoint | None) -> tuple[Rows, Rows, Ge
         return None
     points = points[is_fix]
     at = origin or GeoPoint(*(float(value) for value in points[0]))
-    return gnss.time_s[is_fix], np.array([ned_from_geodetic(*point, at) for point in points.tolist()]), at
+    return gnss.time_s[is_fix], np.array([_ned(point, at) for point in points]), at
+
+
+def _ned(point: Rows, origin: GeoPoint) -> Rows:
+    """Of latitude [deg], longitude [deg] and altitude [m]."""
+    lat_deg, lon_deg, alt_m = (float(value) for value in point)
+    return np.array(ned_from_geodetic(lat_deg, lon_deg, alt_m, origin))
 
 
 def geodetic_columns(topic: Topic) -> Rows | None:
@@ -147,7 +155,7 @@ def _home(flight: LoggedFlight, origin: GeoPoint | None) -> Rows | None:
     if not len(points):
         return None
     at = np.median(points, axis=0)  # of a damaged log a single row may be anything
-    return np.array(ned_from_geodetic(*(float(value) for value in at), origin))
+    return _ned(at, origin)
 
 
 def _waypoints(flight: LoggedFlight, origin: GeoPoint | None) -> Rows:
@@ -166,8 +174,8 @@ def _waypoints(flight: LoggedFlight, origin: GeoPoint | None) -> Rows:
     if (valid := topic.get("current.valid")) is not None:
         is_set &= valid != 0
     found: list[Rows] = []
-    for point in points[is_set].tolist():
-        ned = np.array(ned_from_geodetic(*point, origin))
+    for point in points[is_set]:
+        ned = _ned(point, origin)
         if not found or np.linalg.norm(ned - found[-1]) > WAYPOINT_APART_M:
             found.append(ned)
     return np.array(found).reshape(-1, 3)

@@ -5,10 +5,10 @@ Bounds are PX4's where it has some; those that are this project's guess say so.
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
-from mission.review.curves import Rows
 from mission.review.innovations import ratios
 from mission.review.logged_flight import LoggedFlight
 from mission.review.panels.actuators import motor_commands
@@ -17,9 +17,9 @@ from mission.review.timeline import Timeline, is_serious
 from mission.review.vibration import BAD_M_S2, GOOD_M_S2, metric
 
 REJECTED, STRAINED = 1.0, 0.5  # test ratios; PX4's log analysis looks at both
-REJECTED_SHARE_MAX, STRAINED_SHARE_MAX = 0.01, 0.05  # of the flight; guess
+REJECTED_FRACTION_MAX, STRAINED_FRACTION_MAX = 0.01, 0.05  # of the flight; guess
 FIELD_SPREAD_GOOD, FIELD_SPREAD_BAD = 0.05, 0.15  # of the mean strength, one sigma; guess
-FULL, FULL_SHARE_GOOD, FULL_SHARE_BAD = 0.995, 0.01, 0.1  # of the time in the air; guess
+FULL, FULL_FRACTION_GOOD, FULL_FRACTION_BAD = 0.995, 0.01, 0.1  # of the time in the air; guess
 FIX_3D = 3
 
 
@@ -75,7 +75,9 @@ def _vibration(flight: LoggedFlight, timeline: Timeline) -> Verdict:
     if clipped:
         samples = "one sample" if clipped == 1 else f"{clipped} samples"
         word, grade = f"{word}, and {samples} at the sensor's limit", max(grade, Level.WARN)
-    return Verdict("Vibration", grade, f"{word}: metric {level:.1f} m/s² or less in 95 % of the flight")
+    return Verdict(
+        "Vibration", grade, f"{word}: metric {level:.1f} m/s² or less in 95\N{NO-BREAK SPACE}% of the flight"
+    )
 
 
 def _clipped(flight: LoggedFlight) -> int:
@@ -118,18 +120,18 @@ def _gnss(flight: LoggedFlight, timeline: Timeline) -> Verdict:
     for name, bound in required.items():
         if name in topic:
             is_good &= topic[name] >= bound if name == "satellites_used" else topic[name] <= bound
-    share = float(np.mean(is_good[in_air]))
+    fraction = float(np.mean(is_good[in_air]))
     words = []
     if "satellites_used" in topic:
         words.append(f"{int(np.median(topic['satellites_used'][in_air]))} satellites")
     if eph is not None:
         words.append(f"{float(np.nanmedian(eph[in_air])):.1f} m horizontally by its own account")
     text = ", ".join(words)
-    if share > 0.99:
+    if fraction > 0.99:
         return Verdict("GNSS", Level.GOOD, f"good throughout: {text}")
-    level = Level.WARN if share > 0.9 else Level.BAD
+    level = Level.WARN if fraction > 0.9 else Level.BAD
     return Verdict(
-        "GNSS", level, f"short of what the estimator requires for {_percent(1.0 - share)} of the time: {text}"
+        "GNSS", level, f"short of what the estimator requires for {_percent(1.0 - fraction)} of the time: {text}"
     )
 
 
@@ -141,13 +143,13 @@ def _innovations(flight: LoggedFlight, timeline: Timeline) -> Verdict:
     for each in found:
         in_air = timeline.in_air(each.time_s)
         values = each.ratio[in_air] if in_air.any() else each.ratio
-        judged.append((_share(values > REJECTED), _share(values > STRAINED), each.name))
+        judged.append((_fraction(values > REJECTED), _fraction(values > STRAINED), each.name))
         peak = max(peak, float(np.nanmax(values, initial=0.0)))
     rejected, strained, name = max(judged)
-    if rejected > REJECTED_SHARE_MAX:
+    if rejected > REJECTED_FRACTION_MAX:
         return Verdict("Innovations", Level.BAD, f"{name} rejected for {_percent(rejected)} of the flight")
     rejected, strained, name = max(judged, key=lambda each: each[1])
-    if strained > STRAINED_SHARE_MAX:
+    if strained > STRAINED_FRACTION_MAX:
         return Verdict(
             "Innovations", Level.WARN, f"{name} above half of its gate for {_percent(strained)} of the flight"
         )
@@ -162,12 +164,12 @@ def _actuators(flight: LoggedFlight, timeline: Timeline) -> Verdict:
     time_s, commands, _ = found
     in_air = timeline.in_air(time_s)
     commands = commands[in_air] if in_air.any() else commands
-    share = _share((commands >= FULL).any(axis=1))
+    fraction = _fraction((commands >= FULL).any(axis=1))
     mean = float(np.nanmean(commands))
-    text = f"a motor at full for {_percent(share)} of the flight, on average at {_percent(mean)}"
-    if share < FULL_SHARE_GOOD:
+    text = f"a motor at full for {_percent(fraction)} of the flight, on average at {_percent(mean)}"
+    if fraction < FULL_FRACTION_GOOD:
         return Verdict("Actuators", Level.GOOD, f"room left: {text}")
-    return Verdict("Actuators", Level.WARN if share < FULL_SHARE_BAD else Level.BAD, f"saturated: {text}")
+    return Verdict("Actuators", Level.WARN if fraction < FULL_FRACTION_BAD else Level.BAD, f"saturated: {text}")
 
 
 def _battery(flight: LoggedFlight, timeline: Timeline) -> Verdict:  # noqa: ARG001  as the others
@@ -183,13 +185,17 @@ def _battery(flight: LoggedFlight, timeline: Timeline) -> Verdict:  # noqa: ARG0
     return Verdict("Battery", level, f"{word}: down to {_percent(least)}")
 
 
-def _share(is_so: Rows) -> float:
+def _fraction(is_so: Any) -> float:
     return float(np.mean(is_so)) if len(is_so) else 0.0
 
 
-def _percent(share: float) -> str:
-    percent = 100.0 * share
-    return f"{percent:.0f} %" if percent >= 10.0 or percent == 0.0 else f"{percent:.1f} %"
+def _percent(fraction: float) -> str:
+    percent = 100.0 * fraction
+    return (
+        f"{percent:.0f}\N{NO-BREAK SPACE}%"
+        if percent >= 10.0 or percent == 0.0
+        else f"{percent:.1f}\N{NO-BREAK SPACE}%"
+    )
 
 
 def _times(count: int) -> str:

@@ -55,7 +55,7 @@ const FRAGMENT_SHADER = `#version 300 es
 
 class Renderer {  // triangles on one canvas, lit by one sun, fading into the sky far away
   constructor(canvas, sunNed, sky) {
-    const gl = this.gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
+    const gl = this.gl = canvas.getContext("webgl2", { alpha: false, antialias: true, preserveDrawingBuffer: true });
     if (!gl) throw new Error("no WebGL");
     const program = gl.createProgram();
     for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX_SHADER], [gl.FRAGMENT_SHADER, FRAGMENT_SHADER]]) {

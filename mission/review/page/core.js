@@ -34,7 +34,9 @@ const modeColour = name => colourOf([0, 2, 3, 5, 4, 6, 7, 1][MODE_HUES[name] % 8
 // ---- time ----
 const LEAST_SPAN_S = 0.05;
 const whole = [data.span[0], Math.max(data.span[1], data.span[0] + 1)];
-const shown = { from: whole[0], to: whole[1], cursor: whole[0] };
+const takeoff = Math.min(...data.flights.map(f => (f.airborne[0] ?? f.armed[0] ?? ["", 0])[1]));
+const inAir = data.flights.flatMap(f => f.airborne), airborne = [Math.min(...inAir.map(s => s[1])), Math.max(...inAir.map(s => s[2]))];
+const shown = { from: whole[0], to: whole[1], cursor: Math.max(takeoff, whole[0]) };
 function showTime(from, to) {  // zooms all plots
   const span = Math.min(Math.max(to - from, LEAST_SPAN_S), whole[1] - whole[0]);
   from = Math.min(Math.max(from, whole[0]), whole[1] - span);
@@ -94,6 +96,7 @@ function ticks(low, high, most) {  // round numbers, as many as there is room fo
   const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   return { found, step, text: v => numberText(v, digits) };
 }
+const signed = text => String(text).replace("-", "−");
 function numberText(v, digits) {
   if (!Number.isFinite(v)) return "–";
   if (Math.abs(v) >= 1e5 || digits > 4) return v === 0 ? "0" : v.toExponential(1).replace("e+", "e").replace("-", "−");

@@ -54,7 +54,7 @@ function parameterCard(flight) {
 function timelines() {
   const body = by("timeline-body");
   data.flights.forEach((flight, k) => {
-    const bands = [["Mode", flight.modes, modeColour], ["State", [...flight.armed, ...flight.airborne], name => name === "armed" ? palette.c4 ?? colourOf(3) : colourOf(2)]].filter(([, spans]) => spans.length);
+    const bands = [["Mode", flight.modes, modeColour], ["State", [...flight.armed, ...flight.airborne], name => colourOf(name === "armed" ? 3 : 2)]].filter(([, spans]) => spans.length);
     if (flight.failsafe.length) bands.push(["Failsafe", flight.failsafe, () => palette.bad]);
     const figure = element("figure", { "data-panel": "timeline" }, element("figcaption", {}, several ? swatch(colourOf(k)) : "", letter(k) + (several ? flight.name : "What it did")));
     if (flight.missing.length) figure.append(element("p", { class: "missing", style: "padding:0 12px" }, flight.missing.join("; ")));
@@ -94,7 +94,7 @@ function drawBands(canvas, bands, texts) {
   g.fillStyle = palette.soft; g.textAlign = "right"; g.textBaseline = "middle"; g.font = "11px system-ui, sans-serif";
   bands.forEach(([name], row) => {
     if (name !== "State") return g.fillText(name, MARGIN.left - 4, MARGIN.top + 12 + 24 * row);
-    g.fillText("armed", MARGIN.left - 4, MARGIN.top + 7 + 24 * row); g.fillText("in air", MARGIN.left - 4, MARGIN.top + 18 + 24 * row);
+    g.font = "10px system-ui, sans-serif"; g.fillText("armed", MARGIN.left - 4, MARGIN.top + 6 + 24 * row); g.fillText("in air", MARGIN.left - 4, MARGIN.top + 18 + 24 * row); g.font = "11px system-ui, sans-serif";
   });
   g.fillText("texts", MARGIN.left - 4, base);
   drawCursor(g, x, MARGIN.top, height - MARGIN.top - MARGIN.bottom);
@@ -115,7 +115,7 @@ function textList(flight) {
 const plots = [];
 function sections() {
   const contents = by("contents"), link = (id, title) => contents.append(element("a", { href: "#" + id }, title));
-  link("overview", "Overview"); link("where", "Track"); link("timeline", "Modes");
+  link("overview", "Overview"); if (by("checks")) link("checks", "Checks"); link("where", "Track"); link("timeline", "Modes");
   for (const section of data.sections) {
     const body = element("section", { id: section.key }, element("h2", {}, section.title));
     if (section.missing.length) body.append(element("p", { class: "missing" }, section.missing.join("; ")));

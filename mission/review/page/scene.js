@@ -7,7 +7,7 @@ class FlightScene {
     this.canvas = canvas;
     this.renderer = new Renderer(canvas, data.sun_ned, rgbOf(palette.sky).map(v => v / 255));
     this.extent();
-    this.follows = true;
+    this.follows = false;
     this.turn = 0.6; this.rise = 0.45; this.away = 6;
     this.build();
     addView(canvas, () => this.draw());
@@ -34,15 +34,24 @@ class FlightScene {
     const floor = [n0 - half, e0 - half, ground + 0.02, n0 + half, e0 - half, ground + 0.02, n0 + half, e0 + half, ground + 0.02, n0 - half, e0 + half, ground + 0.02];
     this.floor = r.thing(new Float32Array(floor), new Uint32Array([0, 1, 2, 0, 2, 3]), new Uint8Array(Array(4).fill(rgbOf(palette.ground)).flat()));
     this.things = tracks.map((t, k) => t && {
-      track: t, line: r.ribbon(t.pos, rgbOf(colourOf(k)), 0.003 * this.size), wall: this.curtain(t.pos, rgbOf(colourOf(k))),
-      shadow: r.ribbon(t.pos.map((v, i) => i % 3 === 2 ? ground - 0.01 : v), rgbOf(palette.soft), 0.0015 * this.size), body: r.mesh(data.vehicles[k]),
+      track: t, near: this.band(t.pos, rgbOf(colourOf(k)), 0.02), line: this.band(t.pos, rgbOf(colourOf(k)), 0.0028 * this.size), wall: this.curtain(t.pos, rgbOf(colourOf(k))), veil: this.veil(t.pos),
+      shadow: r.ribbon(t.pos.map((v, i) => i % 3 === 2 ? ground - 0.01 : v), rgbOf(palette.soft), 0.0012 * this.size), body: r.mesh(data.vehicles[k]),
     }).filter(Boolean);
     by("scene-note").textContent = `grid of ${step} m`;
   }
-  curtain(pos, rgb) {  // from the track down to the ground
+  band(pos, rgb, width) {  // a level band and an upright one: seen from everywhere
+    const lifted = w => pos.map((v, i) => i % 3 === 2 ? v - w : v);
+    return [this.renderer.ribbon(pos, rgb, width), this.curtain(lifted(width), rgb, lifted(-width))];
+  }
+  veil(pos) {  // how opaque a curtain is: many rounds lie behind one another
+    let length = 0;
+    for (let i = 3; i < pos.length; i += 3) length += Math.hypot(pos[i] - pos[i - 3], pos[i + 1] - pos[i - 2]);
+    return 0.14 / Math.max(1, length / (4 * this.size));
+  }
+  curtain(pos, rgb, below) {  // from the track down to the ground
     const n = pos.length / 3, v = new Float32Array(2 * pos.length), f = new Uint32Array(6 * Math.max(n - 1, 0)), c = new Uint8Array(2 * pos.length);
     for (let i = 0; i < n; i++) {
-      v.set([pos[3 * i], pos[3 * i + 1], pos[3 * i + 2], pos[3 * i], pos[3 * i + 1], this.ground], 6 * i);
+      v.set([pos[3 * i], pos[3 * i + 1], pos[3 * i + 2], ...(below ? below.slice(3 * i, 3 * i + 3) : [pos[3 * i], pos[3 * i + 1], this.ground])], 6 * i);
       c.set([...rgb, ...rgb], 6 * i);
       if (i < n - 1) f.set([2 * i, 2 * i + 1, 2 * i + 2, 2 * i + 1, 2 * i + 3, 2 * i + 2], 6 * i);
     }
@@ -84,16 +93,16 @@ class FlightScene {
     r.draw(this.floor, STILL, 0);
     gl.disable(gl.DEPTH_TEST);
     for (const line of this.lines) r.draw(line, STILL, 0);
-    for (const it of this.things) r.draw(it.shadow, STILL, 0);
+    if (!this.follows) for (const it of this.things) r.draw(it.shadow, STILL, 0);
     gl.enable(gl.DEPTH_TEST);
     const enlarged = this.follows ? 1 : Math.max(1, 0.045 * away);
     this.things.forEach((it, k) => {
-      r.draw(it.line, STILL, 0);
+      for (const part of this.follows ? it.near : it.line) r.draw(part, STILL, 0);
       const m = pose(states[k].pos, states[k].q);
       r.draw(it.body, m.map((v, i) => i < 12 ? v * enlarged : v));
     });
     gl.enable(gl.BLEND); gl.depthMask(false);
-    for (const it of this.things) r.draw(it.wall, STILL, 0, 0.13);
+    for (const it of this.things) r.draw(it.wall, STILL, 0, it.veil);
     gl.disable(gl.BLEND); gl.depthMask(true);
   }
 }

@@ -81,8 +81,8 @@ class Waterfall {
     this.key = element("canvas", { width: 120, height: 10, style: "width:120px;height:10px" });
     const name = several ? ` ${w.flight ? "B" : "A"}` : "";
     this.figure = element("figure", { class: "plot", "data-panel": "waterfall_" + w.key },
-      element("figcaption", {}, `${w.title} against time${name}`, element("span", { class: "soft" }, " [Hz], all axes")),
-      element("div", { class: "legend" }, `${w.db[0]} dB`, this.key, `${w.db[1]} dB re 1 ${w.unit}`), this.canvas);
+      element("figcaption", {}, `${w.title} spectrum against time${name}`, element("span", { class: "soft" }, " [Hz], all axes")),
+      element("div", { class: "legend" }, signed(`${w.db[0]} dB`), this.key, signed(`${w.db[1]} dB re 1 ${w.unit}`)), this.canvas);
     this.picture = document.createElement("canvas");
     this.paint();
     legends.push(() => this.paint());

@@ -15,6 +15,8 @@ class TimePlot {
       dash: c.setpoint ? [5, 3] : several && !isByFlight && c.flight ? [2, 2] : [],
       title: (several ? "AB"[c.flight] ? "AB"[c.flight] + " " : `${c.flight + 1} ` : "") + c.name,
     }));
+    const measured = this.curves.filter(c => !c.setpoint), asked = this.curves.filter(c => c.setpoint);
+    this.order = [...measured.reverse(), ...asked];  // the last is on top
     this.canvas = element("canvas", { "aria-label": `${panel.title}${panel.unit ? ` in ${panel.unit}` : ""} against time` });
     this.legend = element("div", { class: "legend" });
     const unit = element("span", { class: "soft" }, panel.unit ? ` [${panel.unit}]` : "");
@@ -36,21 +38,34 @@ class TimePlot {
         button.onclick = () => { curve.isHidden = !curve.isHidden; paint(); redraw(); };
         this.legend.append(button);
       }
+      for (const [level, name] of this.panel.bounds) {
+        const bound = element("span", { class: "bound" });
+        bound.innerHTML = `<svg viewBox="0 0 20 8" aria-hidden="true"><line x1="0" y1="4" x2="20" y2="4" stroke="${palette.bad}" stroke-width="1.5" stroke-dasharray="2 3"/></svg>`;
+        bound.append(`${name}: ${level}`);
+        this.legend.append(bound);
+      }
     };
     legends.push(paint);
     paint();
   }
-  range() {  // of what is shown
+  extremes(from, to) {
     let low = Infinity, high = -Infinity;
     for (const c of this.curves) {
       if (c.isHidden) continue;
-      const end = Math.min(indexAt(c.times, shown.to) + 2, c.times.length);
-      for (let i = Math.max(indexAt(c.times, shown.from), 0); i < end; i++) {
+      const end = Math.min(indexAt(c.times, to) + 2, c.times.length);
+      for (let i = Math.max(indexAt(c.times, from), 0); i < end; i++) {
         const v = c.values[i];
         if (v < low) low = v;
         if (v > high) high = v;
       }
     }
+    return [low, high];
+  }
+  range() {  // of what is shown
+    let [low, high] = [Infinity, -Infinity];
+    if (this.panel.of_flight && airborne[1] > airborne[0])
+      [low, high] = this.extremes(Math.max(shown.from, airborne[0]), Math.min(shown.to, airborne[1]));
+    if (!(low <= high)) [low, high] = this.extremes(shown.from, shown.to);
     if (!(low <= high)) { low = 0; high = 1; }
     if (this.panel.zero) low = Math.min(low, 0);
     if (this.panel.ceiling !== null) high = Math.min(high, this.panel.ceiling);
@@ -67,19 +82,18 @@ class TimePlot {
     drawModes(g, x, MARGIN.top, h);
     drawTimeAxis(g, x, width, height, MARGIN);
     g.textAlign = "right"; g.textBaseline = "middle"; g.strokeStyle = palette.grid; g.lineWidth = 1;
-    const up = ticks(low, high, Math.max(2, h / 34));
+    const up = ticks(low, high, Math.max(3, h / 28));
     for (const v of up.found) {
       g.beginPath(); g.moveTo(MARGIN.left, y(v)); g.lineTo(width - MARGIN.right, y(v)); g.stroke();
       g.fillStyle = palette.soft; g.fillText(up.text(v), MARGIN.left - 6, y(v));
     }
     g.save();
     g.beginPath(); g.rect(MARGIN.left, MARGIN.top, w, h); g.clip();
-    for (const [level, name] of this.panel.bounds) {
+    for (const [level] of this.panel.bounds) {
       if (level > high || level < low) continue;
       g.strokeStyle = palette.bad; g.setLineDash([2, 3]); g.beginPath(); g.moveTo(MARGIN.left, y(level)); g.lineTo(width - MARGIN.right, y(level)); g.stroke(); g.setLineDash([]);
-      g.fillStyle = palette.bad; g.textAlign = "left"; g.fillText(name, MARGIN.left + 4, y(level) - 8 > MARGIN.top ? y(level) - 8 : y(level) + 9);
     }
-    for (const c of this.curves) if (!c.isHidden) this.line(g, c, x, y);
+    for (const c of this.order) if (!c.isHidden) this.line(g, c, x, y);
     g.restore();
     drawCursor(g, x, MARGIN.top, h);
     for (const c of this.curves) if (c.told) {
@@ -89,14 +103,15 @@ class TimePlot {
   }
   line(g, c, x, y) {
     const end = Math.min(indexAt(c.times, shown.to) + 2, c.times.length);
-    g.strokeStyle = c.colour(); g.lineWidth = c.setpoint ? 1.2 : 1.5; g.setLineDash(c.dash);
+    const wraps = this.panel.wraps, begin = Math.max(indexAt(c.times, shown.from), 0), isDense = end - begin > 1.5 * this.canvas.clientWidth;
+    g.strokeStyle = c.colour(); g.lineWidth = c.setpoint || isDense ? 1.1 : 1.6; g.setLineDash(c.dash);
     g.beginPath();
     let isDown = false, before = 0;
-    for (let i = Math.max(indexAt(c.times, shown.from), 0); i < end; i++) {
+    for (let i = begin; i < end; i++) {
       const v = c.values[i];
       if (!Number.isFinite(v)) { isDown = false; continue; }
       const px = x(c.times[i]), py = y(v);
-      if (!isDown) g.moveTo(px, py);
+      if (!isDown || (wraps && Math.abs(v - c.values[i - 1]) > 180)) g.moveTo(px, py);
       else { if (c.step) g.lineTo(px, before); g.lineTo(px, py); }
       isDown = true; before = py;
     }

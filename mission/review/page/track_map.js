@@ -128,10 +128,10 @@ class TrackMap {
   }
   scaleBar(g, width, height, scale) {
     const metres = ticks(0, 130 / scale, 1).step, length = metres * scale * (metres * scale > 140 ? 0.5 : 1);
-    const told = length / scale, left = 14, bottom = height - 14;
+    const told = +(length / scale).toPrecision(3), left = 14, bottom = height - 14;
     g.strokeStyle = g.fillStyle = palette.ink; g.lineWidth = 1.5;
     g.beginPath(); g.moveTo(left, bottom - 5); g.lineTo(left, bottom); g.lineTo(left + length, bottom); g.lineTo(left + length, bottom - 5); g.stroke();
-    g.textAlign = "left"; g.textBaseline = "bottom"; g.fillText(told >= 1000 ? `${told / 1000} km` : `${+told.toPrecision(3)} m`, left + 2, bottom - 6);
+    g.textAlign = "left"; g.textBaseline = "bottom"; g.fillText(told >= 1000 ? `${told / 1000} km` : `${told} m`, left + 2, bottom - 6);
     g.save(); g.translate(20, 26);
     g.beginPath(); g.moveTo(0, -14); g.lineTo(5, 4); g.lineTo(0, 1); g.lineTo(-5, 4); g.closePath(); g.fill();
     g.textAlign = "center"; g.textBaseline = "top"; g.fillText("N", 0, 7);

@@ -17,7 +17,17 @@ def estimator(flight: LoggedFlight) -> Section:
     if found:
         lines = [line for each in found for line in curves(each.time_s, each.ratio, [each.name])]
         panels.append(
-            Panel("ratios", "Test ratios", "", tuple(lines), ((1.0, "rejected"),), 1.2, True, RATIO_SHOWN_MAX)
+            Panel(
+                "ratios",
+                "Test ratios",
+                "",
+                tuple(lines),
+                ((1.0, "rejected"),),
+                1.2,
+                True,
+                is_of_flight=True,
+                ceiling=RATIO_SHOWN_MAX,
+            )
         )
     else:
         missing.append(
@@ -46,7 +56,7 @@ def _innovation(each: Innovation) -> Panel:
         worst[~np.isfinite(worst)] = np.nan
         for sign, name in ((1.0, "1 sigma"), (-1.0, "")):
             lines += curves(each.time_s, sign * worst, [name], is_setpoint=True)
-    return Panel(f"innov_{each.key}", f"Innovation: {each.name}", each.unit, tuple(lines))
+    return Panel(f"innov_{each.key}", f"Innovation: {each.name}", each.unit, tuple(lines), is_of_flight=True)
 
 
 def _uncertainty(flight: LoggedFlight) -> Panel | None:

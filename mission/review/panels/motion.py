@@ -74,7 +74,8 @@ def _section(
             for curve in curves(rows[0], rows[1][:, axis], [name], is_setpoint=name == SETPOINT)
         ]
         if lines:
-            panels.append(Panel(f"{key}{axis}", axis_title, unit, tuple(lines), least_span=least_span))
+            wraps = axis_title == "Yaw"
+            panels.append(Panel(f"{key}{axis}", axis_title, unit, tuple(lines), least_span=least_span, wraps=wraps))
     return Section(key, title, tuple(panels), missing)
 
 
@@ -108,7 +109,7 @@ def _euler_deg(topic: Topic | None, name: str) -> Found:
     quaternions = None if topic is None else topic.vector(name, 4)
     if topic is None or quaternions is None:
         return None
-    return topic.time_s, _continuous_deg(euler_rad(quaternions[:, [1, 2, 3, 0]]))
+    return topic.time_s, np.degrees(euler_rad(quaternions[:, [1, 2, 3, 0]]))
 
 
 def _attitude_setpoint(topic: Topic | None) -> Found:
@@ -118,11 +119,3 @@ def _attitude_setpoint(topic: Topic | None) -> Found:
     if quaternions is not None and np.nanmax(np.abs(quaternions), initial=0.0) > 0.0:
         return _euler_deg(topic, "q_d")
     return _degrees(_axes(topic, "roll_body pitch_body yaw_body"))
-
-
-def _continuous_deg(angles_rad: Rows) -> Rows:
-    """Degrees; NaN where the heading jumps by a turn: no line is drawn across the plot."""
-    angles = np.degrees(angles_rad)
-    jumps = np.flatnonzero(np.abs(np.diff(angles[:, 2])) > 180.0)
-    angles[jumps, 2] = np.nan
-    return angles
