@@ -36,19 +36,21 @@ def found_logs(path: Path) -> list[FoundLog]:
 
 
 def _in_folder(folder: Path, name: str, depth: int) -> list[FoundLog]:
-    """The run that this folder is, or else each log in it; then those of the folders below."""
+    """The run that this folder is, whatever else lies in it; or else each log in it and below."""
     try:
         entries = sorted(folder.iterdir())
     except OSError as error:
         raise ReviewError(f"{folder}: cannot be read: {error.strerror or error}") from error
     logs = [entry for entry in entries if entry.suffix == SUFFIX and entry.is_file()]
     parts = sorted((log for log in logs if _part_number(log)), key=_part_number)
-    found = [FoundLog(tuple(parts), name, folder)] if parts else []
-    found += [FoundLog((log,), f"{name}/{log.stem}" if depth else log.stem, None) for log in logs if log not in parts]
+    if parts:
+        return [FoundLog(tuple(parts), name, folder)]
+    prefix = f"{name}/" if depth else ""
+    found = [FoundLog((log,), f"{prefix}{log.stem}", None) for log in logs]
     if depth < DEPTH_MAX:
         for entry in entries:
             if entry.is_dir() and not entry.is_symlink():
-                found += _in_folder(entry, f"{name}/{entry.name}" if depth else entry.name, depth + 1)
+                found += _in_folder(entry, f"{prefix}{entry.name}", depth + 1)
     return found
 
 

@@ -20,6 +20,7 @@ Rows = NDArray[Any]
 MAGIC = b"ULog\x01\x12\x35"
 ABSURD = 1e12  # no quantity that is plotted comes near it
 GAP_MAX_S = 60.0  # in a damaged log, what lies farther away is of no such time; guess
+PAUSE_MAX_S = 3600.0  # in any log: damage is not always noticed; guess
 STRAY_RANGES = 3.0  # beyond the middle 98 %, in its own widths; guess
 CLOCK_TOPICS = ("sensor_combined", "vehicle_attitude", "vehicle_local_position")
 LEVELS = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
@@ -189,11 +190,12 @@ def _bounds_us(raw: dict[tuple[str, int], dict[str, Rows]], begun_us: int, *, is
         return 0, 0
     clocks = [times[name, 0] for name in CLOCK_TOPICS if (name, 0) in times] or [max(times.values(), key=len)]
     steady = np.sort(np.concatenate(clocks))
+    cuts = np.flatnonzero(np.diff(steady) > (GAP_MAX_S if is_damaged else PAUSE_MAX_S) * 1e6) + 1
+    steady = max(np.split(steady, cuts), key=len)
     if is_damaged:
-        cuts = np.flatnonzero(np.diff(steady) > GAP_MAX_S * 1e6) + 1
-        steady = max(np.split(steady, cuts), key=len)
         return int(steady[0]), int(steady[-1])
-    end_us = max(int(each.max()) for each in times.values())
+    latest_us = int(steady[-1] + GAP_MAX_S * 1e6)
+    end_us = max(int(each[each <= latest_us].max(initial=steady[-1])) for each in times.values())
     is_given = 0 < begun_us <= steady[0]
     return begun_us if is_given else int(steady[0]), end_us
 
@@ -204,7 +206,7 @@ def _topic(name: str, columns: dict[str, Rows], start_us: int, end_us: int, *, i
         order = np.flatnonzero((time_us >= start_us) & (time_us <= end_us))
     else:
         time_us = np.maximum(time_us, start_us)  # states from before hold when it begins
-        order = np.arange(len(time_us))
+        order = np.flatnonzero(time_us <= end_us)
     if (np.diff(time_us[order]) < 0).any():
         order = order[np.argsort(time_us[order], kind="stable")]
     kept = {key: _plausible(column[order], is_damaged=is_damaged) for key, column in columns.items()}

@@ -14,6 +14,7 @@ from mission.review.logged_flight import LoggedFlight, Topic
 WINDOW = 512  # samples
 LEAST_RATE_HZ = 50.0  # below, a spectrum tells nothing of motors
 COLUMNS_MAX = 400  # of the waterfall, in time
+HOLLOW_MAX = 8.0  # of the samples that there would be without holes
 GAP_PERIODS = 5.0  # a window with such a hole is left out
 GOOD_M_S2, BAD_M_S2 = 4.905, 9.81  # PX4's Flight Review: what its plot of the metric colours
 METRIC_FORGETS = 0.01  # of PX4's metric, each sample
@@ -97,6 +98,8 @@ def _spectrum(key: str, title: str, unit: str, topic: Topic, columns: Rows) -> S
     time_s, rate_hz = topic.time_s, _rate_hz(topic.time_s)
     is_good = np.isfinite(columns).all(axis=1)
     time_s, columns = time_s[is_good], columns[is_good]
+    if len(time_s) < WINDOW or (time_s[-1] - time_s[0]) * rate_hz > HOLLOW_MAX * len(time_s):
+        return None
     holes = np.concatenate([[0], np.cumsum(np.diff(time_s) > GAP_PERIODS / rate_hz)])
     even_s = np.arange(time_s[0], time_s[-1], 1.0 / rate_hz)
     even = np.stack([np.interp(even_s, time_s, columns[:, axis]) for axis in range(3)], axis=1)
