@@ -53,7 +53,8 @@ def track(flight: LoggedFlight, origin: GeoPoint | None = None) -> Track | None:
         source = "GNSS positions"
     shift = np.zeros(3)
     if origin is not None and own is not None and origin != own:
-        shift = np.array(ned_from_geodetic(own.lat_deg, own.lon_deg, own.alt_m, origin))
+        apart = np.array(ned_from_geodetic(own.lat_deg, own.lon_deg, own.alt_m, origin))
+        shift = apart if np.linalg.norm(apart) < REACH_M else shift  # flown elsewhere: laid over by their origins
     is_good = np.isfinite(pos).all(axis=1)
     time_s, pos = time_s[is_good], pos[is_good]
     if len(time_s) < 2:

@@ -95,7 +95,7 @@ class FlightScene {
     for (const line of this.lines) r.draw(line, STILL, 0);
     if (!this.follows) for (const it of this.things) r.draw(it.shadow, STILL, 0);
     gl.enable(gl.DEPTH_TEST);
-    const enlarged = this.follows ? 1 : Math.max(1, 0.045 * away);
+    const enlarged = this.follows ? 1 : Math.max(1, 0.11 * away);
     this.things.forEach((it, k) => {
       for (const part of this.follows ? it.near : it.line) r.draw(part, STILL, 0);
       const m = pose(states[k].pos, states[k].q);

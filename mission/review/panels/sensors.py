@@ -80,8 +80,10 @@ def heights(flight: LoggedFlight) -> Section:
     topic = gnss_topic(flight)
     alt = None if topic is None else topic.get("altitude_msl_m", "alt")
     if topic is not None and alt is not None:
-        scale = 1e-3 if topic.name and alt.dtype.kind in "iu" else 1.0
-        lines += curves(topic.time_s, scale * (alt - float(_first(alt))), ["GNSS, from its first"])
+        alt = 1e-3 * alt if alt.dtype.kind in "iu" else alt  # PX4's older logs: millimetres
+        ref = None if local is None else local.get("ref_alt")
+        start_m, name = (_first(alt), "GNSS, from its first") if ref is None else (_last(ref), "GNSS, above the origin")
+        lines += curves(topic.time_s, alt - start_m, [name])
     baro = flight.topic("vehicle_air_data")
     if baro is not None and "baro_alt_meter" in baro:
         alt = baro["baro_alt_meter"]
@@ -92,6 +94,10 @@ def heights(flight: LoggedFlight) -> Section:
     if not lines:
         return Section("heights", "Height", (), ("no height",))
     return Section("heights", "Height", (Panel("heights", "Height", "m", tuple(lines), least_span=1.0),))
+
+
+def _last(values: np.ndarray) -> float:
+    return _first(values[::-1])
 
 
 def _first(values: np.ndarray) -> float:
