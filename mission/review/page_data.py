@@ -13,12 +13,11 @@ from mission.review.panels.motion import TRUE
 from mission.review.timeline import Span
 from mission.review.vibration import Spectrum
 from mission.view import shapes
-from mission.view.html import mesh_data
+from mission.view.page_arrays import Json, mesh_data
 
 PLAIN_AIRFRAME = "x500"  # drawn for vehicles of others
 DB_RANGE = (2.0, 99.8)  # percentiles of a waterfall between which its colours lie
 TEXTS_MAX, PARAMETERS_MAX = 500, 2000
-Json = dict[str, Any]
 
 
 def page_data(reviews: Sequence[FlightReview], title: str) -> Json:

@@ -17,7 +17,7 @@ def review(
     output: Annotated[
         Path | None, typer.Option(help="The HTML file; of many flights a folder. Default: beside the log.")
     ] = None,
-    open: Annotated[bool, typer.Option(help="Show it in the browser.")] = False,  # noqa: A002  the name of the option
+    open: Annotated[bool, typer.Option("--open", help="Show it in the browser.")] = False,  # noqa: A002  the name of the option
 ) -> None:
     """Review flights: one HTML file with map, replay, plots and health, which needs no network."""
     with loading(Console()):

@@ -7,7 +7,7 @@ from outside, and colours with the light already in them where nobody lights the
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,9 @@ from mission.view.vehicle_shapes.mesh import (
     trunk,
 )  # fmt: skip
 from mission.view.vehicle_shapes.plane import plane
-from sim.world.walls import WALL_THICKNESS_M
-from sim.world.world import WorldMap
+
+if TYPE_CHECKING:  # the vehicles alone are light to import
+    from sim.world.world import WorldMap
 
 __all__ = [
     "BARK", "BLADE", "FRAME", "SUN_NED", "Mesh", "Trees", "VehicleShape", "ball", "beam", "blade_radius_m", "box",
@@ -63,7 +64,7 @@ class Trees:
     crown_colours: NDArray[np.uint8]  # (trees, 3)
 
 
-def ground(world: WorldMap, cells_most: int = 256) -> Mesh:
+def ground(world: "WorldMap", cells_most: int = 256) -> Mesh:
     """The terrain, hill-shaded; its grid is thinned so that a side has at most `cells_most` cells."""
     half_m = 0.5 * world.config.size_m
     count = min(world.heights.shape[0], cells_most + 1)
@@ -87,7 +88,7 @@ def ground(world: WorldMap, cells_most: int = 256) -> Mesh:
     return Mesh(vertices, faces.astype(np.uint32), np.clip(colour * light[:, None], 0, 255).astype(np.uint8))
 
 
-def trees(world: WorldMap) -> Trees:
+def trees(world: "WorldMap") -> Trees:
     """Every tree; a crown is drawn as the ellipsoid round its capsule's axis."""
     rows = world.trees
     crown_half_m = 0.5 * (rows["crown_high"] - rows["crown_low"]) + rows["crown_radius"]
@@ -104,8 +105,10 @@ def trees(world: WorldMap) -> Trees:
     )
 
 
-def walls(world: WorldMap) -> Mesh | None:
+def walls(world: "WorldMap") -> Mesh | None:
     """The ring of walls round the map, if there is one."""
+    from sim.world.walls import WALL_THICKNESS_M
+
     if not world.config.has_walls:
         return None
     half_m = 0.5 * world.config.size_m
@@ -123,7 +126,7 @@ def walls(world: WorldMap) -> Mesh | None:
     return joined(boxes)
 
 
-def boxes(world: WorldMap, tick: int = 0, *, movers: bool = True) -> Mesh | None:
+def boxes(world: "WorldMap", tick: int = 0, *, movers: bool = True) -> Mesh | None:
     """The boxes in the world, as they are at a tick, with those that move or without; None if there are none."""
     rows = world.boxes.rows
     meshes = [
@@ -135,7 +138,7 @@ def boxes(world: WorldMap, tick: int = 0, *, movers: bool = True) -> Mesh | None
     return joined(meshes) if meshes else None
 
 
-def moving_boxes(world: WorldMap) -> list[tuple[int, Mesh]]:
+def moving_boxes(world: "WorldMap") -> list[tuple[int, Mesh]]:
     """Those that run to and fro: which of the world's boxes, and its shape round its middle on the map."""
     rows = world.boxes.rows
     return [(i, _box_round_middle(rows[i])) for i in range(len(rows)) if rows[i]["period_ticks"] > 0]

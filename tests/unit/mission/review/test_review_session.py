@@ -3,6 +3,8 @@
 import json
 import re
 import shutil
+import subprocess
+import sys
 
 import pytest
 from typer.testing import CliRunner
@@ -60,6 +62,12 @@ def test_our_own_flight_recorder_is_reviewed_beside_its_log(tmp_path):
     lacks = {section["title"]: section["missing"] for section in data["sections"]}
     assert {title for title, missing in lacks.items() if missing} <= {"Actuators"}
     assert data["flights"][0]["has_defaults"]
+
+
+def test_a_review_loads_neither_the_simulator_nor_an_extra():
+    script = "import mission.review.review_session, sys; print([m for m in ('warp', 'sim', 'viser', 'cv2') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
 
 
 def test_two_logs_are_laid_over_each_other_where_they_took_off(px4_log, tmp_path):
