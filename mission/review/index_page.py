@@ -29,22 +29,27 @@ class IndexRow:
     distance_m: float
 
     @property
-    def rank(self) -> tuple[bool, int, float, int, str]:
-        """The worst first: without a page, by failed checks, by the narrowest margin, by verdict."""
-        return bool(self.link), -self.failed, inf if self.margin is None else self.margin, -self.level, self.name
+    def rank(self) -> tuple[bool, int, bool, float, int, str]:
+        """The worst first: without a page, by failed checks, by bad verdicts, by the narrowest margin."""
+        margin = inf if self.margin is None else self.margin
+        return bool(self.link), -self.failed, self.level != Level.BAD, margin, -self.level, self.name
 
 
 def index_row(review: FlightReview, link: str) -> IndexRow:
     margins = [check.margin for check in review.checks if check.margin is not None]
+    failed = [check for check in review.checks if check.is_passed is False]
     troubles = [verdict for verdict in review.verdicts if verdict.level in (Level.WARN, Level.BAD)]
     return IndexRow(
         name=review.flight.name,
         link=link,
-        failed=sum(check.is_passed is False for check in review.checks),
+        failed=len(failed),
         checks=len(review.checks),
         margin=min(margins, default=None),
-        level=max(verdict.level for verdict in review.verdicts if verdict.level != Level.UNKNOWN or not troubles),
-        words="; ".join(f"{each.title}: {each.text}" for each in sorted(troubles, key=lambda each: -each.level)),
+        level=Level.BAD if failed else max(verdict.level for verdict in review.verdicts),
+        words="; ".join(
+            [f"{check.name} failed" for check in failed]
+            + [f"{each.title}: {each.text}" for each in sorted(troubles, key=lambda each: -each.level)]
+        ),
         result=review.result,
         duration_s=review.flight.duration_s,
         distance_m=review.distance_m,
@@ -77,7 +82,7 @@ def _row(row: IndexRow) -> str:
     name = f'<a href="{escape(row.link)}">{escape(row.name)}</a>' if row.link else escape(row.name)
     checks = f"{row.checks - row.failed} of {row.checks}" if row.checks else "–"
     kind = "fail" if row.failed else "pass" if row.checks else ""
-    margin = "–" if row.margin is None else f"{row.margin:.3g}"
+    margin = "–" if row.margin is None else f"{row.margin:.3g}".replace("-", "−")
     way = f"{row.distance_m / 1000.0:.2f} km" if row.distance_m >= LEAST_SHOWN_M else f"{row.distance_m:.0f} m"
     cells = (
         f'<td class="{row.level.name.lower()}"><span class="mark">{MARKS[row.level]}</span></td>',
