@@ -29,4 +29,4 @@ def review_page(reviews: Sequence[FlightReview], title: str) -> bytes:
 
 def page_part(name: str) -> str:
     """A file of the page, as text."""
-    return files("mission.review").joinpath("page", name).read_text(encoding="utf-8")
+    return files("mission.review.page").joinpath(name).read_text(encoding="utf-8")

@@ -103,4 +103,4 @@ def _write(target: Path, page: bytes) -> None:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_whole(target, page)
     except OSError as error:
-        raise ReviewError(f"{target}: cannot be written: {error.strerror or error}") from error
+        raise ReviewError(f"{target}: cannot be written: {error.strerror or error}; name another --output") from error
