@@ -25,6 +25,7 @@ class Check:
     worst_s: float | None  # simulated time
     asked: str
     happened: str
+    unit: str = ""  # of the margin
 
 
 def checks_of(folder: Path) -> tuple[Check, ...]:
@@ -66,6 +67,7 @@ def _check(raw: dict[str, Any]) -> Check:
         worst_s=_number(raw.get("worst_s")),
         asked=_text(raw.get("asked")),
         happened=_text(raw.get("happened")),
+        unit=_text(raw.get("unit")),
     )
 
 

@@ -65,6 +65,7 @@ def _flight(review: FlightReview, shift_s: float) -> Json:
                 "name": check.name,
                 "passed": check.is_passed,
                 "margin": check.margin,
+                "unit": check.unit,
                 "worst": None if check.worst_s is None else check.worst_s - flight.start_s - shift_s,
                 "asked": check.asked,
                 "happened": check.happened,

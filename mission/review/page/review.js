@@ -35,7 +35,7 @@ function checkCard(flight) {
     const verdict = element("td", { class: c.passed === false ? "fail" : c.passed ? "pass" : "" }, c.passed === false ? "✗ failed" : c.passed ? "✓ passed" : "–");
     const when = element("td", { class: "num" });
     if (c.worst !== null) when.append(element("button", { onclick: () => setCursor(c.worst) }, clockText(c.worst)));
-    return [element("td", {}, c.name), verdict, element("td", { class: "num" }, c.margin === null ? "–" : numberText(c.margin, Math.abs(c.margin) < 10 ? 2 : 1)), when, element("td", {}, c.asked), element("td", {}, c.happened)];
+    return [element("td", {}, c.name), verdict, element("td", { class: "num" }, c.margin === null ? "–" : `${numberText(c.margin, Math.abs(c.margin) < 10 ? 2 : 1)} ${c.unit}`), when, element("td", {}, c.asked), element("td", {}, c.happened)];
   });
   const failed = flight.checks.filter(c => c.passed === false).length;
   return element("div", { class: "card wide", id: "checks" }, element("h2", {}, failed ? `Checks: ${failed} of ${flight.checks.length} failed` : `Checks: all ${flight.checks.length} passed`),
