@@ -7,6 +7,7 @@ in topics and fields. What a damaged log holds that cannot be true is left out h
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -241,7 +242,7 @@ def _texts(log: ULog, start_us: int, end_us: int) -> list[Text]:
 
 
 def _numbers(values: dict[str, Any]) -> dict[str, float]:
-    return {name: float(value) for name, value in values.items() if isinstance(value, int | float)}
+    return {name: float(value) for name, value in values.items() if isinstance(value, int | float) and isfinite(value)}
 
 
 def _defaults(log: ULog) -> dict[str, float]:

@@ -8,6 +8,7 @@ from mission.review.curves import POINTS_MAX, thinned
 from mission.review.flight_review import review_flight
 from mission.review.innovations import ratios
 from mission.review.logged_flight import ReviewError, read_flight
+from mission.review.review_page import review_page
 from mission.review.vibration import METRIC_FORGETS, metric, spectra
 from tests.unit.mission.review import px4_logs
 from tests.unit.mission.review.px4_logs import ALL, SECONDS, SHAKE_HZ, SHAKE_M_S2, START_US, write
@@ -113,6 +114,13 @@ def test_no_damage_ends_in_anything_but_a_review_or_a_sentence(tmp_path, seed):
     except ReviewError:
         return
     assert len(review.verdicts) == 7
+
+
+def test_a_parameter_that_is_no_number_is_left_out_of_the_page(tmp_path):
+    path = write(tmp_path / "log.ulg", parameters={"A": float("nan"), "B": 2.0}, defaults={"A": 1.0, "B": 1.0})
+    review = review_flight((path,), "log", None, None)
+    assert review.changed_parameters == (("B", 2.0, 1.0),)
+    assert review_page([review], "log")
 
 
 def test_a_test_ratio_is_the_squared_innovation_in_gates(tmp_path):
