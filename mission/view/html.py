@@ -19,6 +19,7 @@ from common.files import write_whole
 from mission.log.euler_angles import yaw_rad
 from mission.view import shapes
 from mission.view.flight_snapshot import distances_m
+from mission.view.page_arrays import Json, array_data, mesh_data
 from mission.view.panel import ACTION_NAMES
 from mission.view.replay_file import Recording
 from mission.view.snapshot_images import onboard_eye
@@ -32,7 +33,6 @@ TILE_COLUMNS = 20
 CELLS_MOST = 128
 JPEG_QUALITY = 80
 STATURE_M = 1.75
-Json = dict[str, Any]
 
 
 def write_html(recording: Recording, world: WorldMap, target: Path, title: str) -> None:
@@ -41,9 +41,11 @@ def write_html(recording: Recording, world: WorldMap, target: Path, title: str) 
     Raises:
         OSError: it cannot be written.
     """
-    page = files("mission.view").joinpath("replay.html").read_text(encoding="utf-8")
+    page, webgl = (
+        files("mission.view").joinpath(name).read_text(encoding="utf-8") for name in ("replay.html", "webgl.js")
+    )
     data = json.dumps(page_data(recording.every(STRIDE), world, title)).replace("</", "<\\/")
-    write_whole(target, page.replace("/*DATA*/", data).encode())
+    write_whole(target, page.replace("/*WEBGL*/", webgl).replace("/*DATA*/", data).encode())
 
 
 def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
@@ -57,36 +59,26 @@ def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
         "sun_ned": shapes.SUN_NED.tolist(),
         "heading_rad": float(yaw_rad(rows["q_ned_from_frd"][:1].astype(float))[0]),
         "has_owner": recording.has_owner,
-        "ground": _mesh(shapes.ground(world, CELLS_MOST)),
-        "walls": None if (walls := shapes.walls(world)) is None else _mesh(walls),
+        "ground": mesh_data(shapes.ground(world, CELLS_MOST)),
+        "walls": None if (walls := shapes.walls(world)) is None else mesh_data(walls),
         **_trees(world),
-        "vehicle": _mesh(shape.body),
-        "blade": _mesh(shape.blade),
-        "boxes": None if (boxes := shapes.standing(world)) is None else _mesh(boxes),
+        "vehicle": mesh_data(shape.body),
+        "blade": mesh_data(shape.blade),
+        "boxes": None if (boxes := shapes.standing(world)) is None else mesh_data(boxes),
         "movers": _movers(recording, world),
         "others": [_other(other) for other in recording.others],
-        "wheel": _mesh(shape.wheels[0]) if shape.drives else None,
-        "wheel_hubs": _array(shape.wheel_hubs),
+        "wheel": mesh_data(shape.wheels[0]) if shape.drives else None,
+        "wheel_hubs": array_data(shape.wheel_hubs),
         "is_steered": list(shape.is_steered),
         "away_m": 3.0 if shape.drives else 7.0,
-        "person": _mesh(shapes.person(STATURE_M)),
-        "hubs": _array(shape.hubs),
+        "person": mesh_data(shapes.person(STATURE_M)),
+        "hubs": array_data(shape.hubs),
         "spins": list(shape.spins),
-        "path_ned": _array(recording.path_ned) if len(recording.path_ned) > 1 else None,
+        "path_ned": array_data(recording.path_ned) if len(recording.path_ned) > 1 else None,
         "track": _track(rows),
         "plots": _plots(recording, drives=shape.drives),
         "onboard": _onboard(recording, world),
     }
-
-
-def _array(values: NDArray[Any]) -> Json:
-    """Numbers for JavaScript's typed arrays, little-endian."""
-    kind = {"f": "f4", "u": "u4", "i": "u4"}[values.dtype.kind] if values.dtype.itemsize > 1 else "u1"
-    return {"type": kind, "data": b64encode(values.astype(f"<{kind}").tobytes()).decode()}
-
-
-def _mesh(mesh: shapes.Mesh) -> Json:
-    return {name: _array(getattr(mesh, name)) for name in ("vertices", "faces", "colours")}
 
 
 def _trees(world: WorldMap) -> Json:
@@ -95,23 +87,27 @@ def _trees(world: WorldMap) -> Json:
         return {"trunks": None}
     bark = np.broadcast_to(np.array(shapes.BARK, np.uint8), forest.crown_colours.shape)
     return {
-        "trunk": _mesh(shapes.trunk()),
-        "ball": _mesh(shapes.ball()),
-        "trunks": {"place": _array(forest.trunk_ned), "size": _array(forest.trunk_size), "tint": _array(bark)},
+        "trunk": mesh_data(shapes.trunk()),
+        "ball": mesh_data(shapes.ball()),
+        "trunks": {
+            "place": array_data(forest.trunk_ned),
+            "size": array_data(forest.trunk_size),
+            "tint": array_data(bark),
+        },
         "crowns": {
-            "place": _array(forest.crown_ned),
-            "size": _array(forest.crown_size),
-            "tint": _array(forest.crown_colours),
+            "place": array_data(forest.crown_ned),
+            "size": array_data(forest.crown_size),
+            "tint": array_data(forest.crown_colours),
         },
     }
 
 
 def _track(rows: NDArray[Any]) -> Json:
     names = ("time_s", "pos_ned", "q_ned_from_frd", "motor_speed", "steering_rad", "mode", "is_armed")
-    return {name: _array(rows[name]) for name in names} | {
-        "turned_rad": _array(turned_rad(rows).astype(np.float32)),
-        "owner_ned": _array(rows["owner"]["pos_ned"]),
-        "owner_heading_rad": _array(rows["owner"]["heading_rad"]),
+    return {name: array_data(rows[name]) for name in names} | {
+        "turned_rad": array_data(turned_rad(rows).astype(np.float32)),
+        "owner_ned": array_data(rows["owner"]["pos_ned"]),
+        "owner_heading_rad": array_data(rows["owner"]["heading_rad"]),
     }
 
 
@@ -121,7 +117,7 @@ def _movers(recording: Recording, world: WorldMap) -> list[Json]:
     movers = shapes.moving_boxes(world)
     places = np.array([world.boxes.middle(tick) for tick in ticks]) if movers else None
     return [
-        {"mesh": _mesh(mesh), "place": _array(places[:, i].astype(np.float32))}
+        {"mesh": mesh_data(mesh), "place": array_data(places[:, i].astype(np.float32))}
         for i, mesh in movers
         if places is not None
     ]
@@ -134,9 +130,9 @@ def _other(recording: Recording) -> Json:
     turning += zip(shape.wheels, shape.wheel_hubs, strict=True)
     parts = [shapes.Mesh((mesh.vertices + hub).astype(np.float32), mesh.faces, mesh.colours) for mesh, hub in turning]
     return {
-        "mesh": _mesh(shapes.joined([shape.body, *parts])),
-        "place": _array(recording.rows["pos_ned"]),
-        "attitude": _array(recording.rows["q_ned_from_frd"]),
+        "mesh": mesh_data(shapes.joined([shape.body, *parts])),
+        "place": array_data(recording.rows["pos_ned"]),
+        "attitude": array_data(recording.rows["q_ned_from_frd"]),
     }
 
 
@@ -153,7 +149,7 @@ def _plots(recording: Recording, *, drives: bool) -> list[Json]:
         plots.insert(0, ("distance to owner [m]", ("distance",), [distances_m(rows)]))
         plots.append(("action", ACTION_NAMES, list(rows["action"].T)))
     return [
-        {"title": title, "names": names, "columns": [_array(column) for column in columns]}
+        {"title": title, "names": names, "columns": [array_data(column) for column in columns]}
         for title, names, columns in plots
     ]
 

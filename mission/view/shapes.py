@@ -7,7 +7,7 @@ from outside, and colours with the light already in them where nobody lights the
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +31,10 @@ from mission.view.vehicle_shapes.mesh import (
     trunk,
 )  # fmt: skip
 from mission.view.vehicle_shapes.plane import plane
-from sim.world.custom.solid_parts import SolidPart
-from sim.world.walls import WALL_THICKNESS_M
-from sim.world.world import WorldMap
+
+if TYPE_CHECKING:  # the vehicles alone are light to import
+    from sim.world.custom.solid_parts import SolidPart
+    from sim.world.world import WorldMap
 
 __all__ = [
     "BARK", "BLADE", "FRAME", "SUN_NED", "Mesh", "Trees", "VehicleShape", "ball", "beam", "blade_radius_m", "box",
@@ -64,7 +65,7 @@ class Trees:
     crown_colours: NDArray[np.uint8]  # (trees, 3)
 
 
-def ground(world: WorldMap, cells_most: int = 256) -> Mesh:
+def ground(world: "WorldMap", cells_most: int = 256) -> Mesh:
     """The terrain, hill-shaded; its grid is thinned so that a side has at most `cells_most` cells."""
     half_m = 0.5 * world.config.size_m
     count = min(world.heights.shape[0], cells_most + 1)
@@ -88,7 +89,7 @@ def ground(world: WorldMap, cells_most: int = 256) -> Mesh:
     return Mesh(vertices, faces.astype(np.uint32), np.clip(colour * light[:, None], 0, 255).astype(np.uint8))
 
 
-def trees(world: WorldMap) -> Trees:
+def trees(world: "WorldMap") -> Trees:
     """Every tree; a crown is drawn as the ellipsoid round its capsule's axis."""
     rows = world.trees
     crown_half_m = 0.5 * (rows["crown_high"] - rows["crown_low"]) + rows["crown_radius"]
@@ -105,8 +106,10 @@ def trees(world: WorldMap) -> Trees:
     )
 
 
-def walls(world: WorldMap) -> Mesh | None:
+def walls(world: "WorldMap") -> Mesh | None:
     """The ring of walls round the map, if there is one."""
+    from sim.world.walls import WALL_THICKNESS_M
+
     if not world.config.has_walls:
         return None
     half_m = 0.5 * world.config.size_m
@@ -124,7 +127,7 @@ def walls(world: WorldMap) -> Mesh | None:
     return joined(boxes)
 
 
-def boxes(world: WorldMap, tick: int = 0, *, movers: bool = True) -> Mesh | None:
+def boxes(world: "WorldMap", tick: int = 0, *, movers: bool = True) -> Mesh | None:
     """The boxes in the world, as they are at a tick, with those that move or without; None if there are none."""
     rows = world.boxes.rows
     meshes = [
@@ -136,21 +139,21 @@ def boxes(world: WorldMap, tick: int = 0, *, movers: bool = True) -> Mesh | None
     return joined(meshes) if meshes else None
 
 
-def standing(world: WorldMap) -> Mesh | None:
+def standing(world: "WorldMap") -> Mesh | None:
     """All boxes that stand and all solids of a world file, each part in one colour; None if there are none."""
     still = boxes(world, movers=False)
     meshes = [*([] if still is None else [still]), *(_in_one_colour(part) for part in world.solids.parts)]
     return joined(meshes) if meshes else None
 
 
-def _in_one_colour(part: SolidPart) -> Mesh:
+def _in_one_colour(part: "SolidPart") -> Mesh:
     """That of an image is its mean."""
     rgb = part.rgb if part.image is None else part.image.reshape(-1, 3).mean(axis=0)
     colours = np.tile(np.array(rgb, np.uint8), (len(part.vertices_ned), 1))
     return Mesh(part.vertices_ned, part.faces.astype(np.uint32), colours)
 
 
-def moving_boxes(world: WorldMap) -> list[tuple[int, Mesh]]:
+def moving_boxes(world: "WorldMap") -> list[tuple[int, Mesh]]:
     """Those that run to and fro: which of the world's boxes, and its shape round its middle on the map."""
     rows = world.boxes.rows
     return [(i, _box_round_middle(rows[i])) for i in range(len(rows)) if rows[i]["period_ticks"] > 0]

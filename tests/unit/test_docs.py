@@ -44,6 +44,7 @@ RUN_BY_OTHERS = (
     f"{HONEYGUIDE} world ",  # tests/unit/mission/world
     f"{HONEYGUIDE} fly --world ",  # tests/unit/mission/world/test_worked_example.py
     f"{HONEYGUIDE} replay ",  # tests/unit/mission/view/test_replay.py
+    f"{HONEYGUIDE} review ",  # tests/unit/mission/review/test_review_session.py
     f"{HONEYGUIDE} benchmark ",  # tests/unit/mission/follow/test_benchmark.py
     f"{HONEYGUIDE} companion ",  # tests/system/companion/test_companion.py
     *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export")),  # tests/unit/mission/train
@@ -247,6 +248,7 @@ SECTIONS_OF_COMMANDS = {  # the page, and the heading under which its options ar
     "fly": ("docs/how-to/flying.md", "Options"),
     "follow": ("docs/how-to/follow-me.md", "Options of follow"),
     "replay": ("docs/how-to/flying.md", "Looking at a run again"),
+    "review": ("docs/how-to/review.md", "Reviewing a flight"),
     "companion": ("docs/how-to/companion.md", "The companion computer"),
     "park": ("docs/how-to/rover.md", "Park it"),
     "play": ("docs/how-to/demonstrations.md", "Watch"),

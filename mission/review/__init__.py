@@ -1,0 +1,1 @@
+"""Flights reviewed by their logs: `honeyguide review`."""

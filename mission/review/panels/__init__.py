@@ -1,0 +1,1 @@
+"""What is plotted of a flight against time, topic by topic."""
