@@ -1,6 +1,6 @@
 """What is asked of a flight. Each check has a tolerance, and may look at a part of the flight only. Light to import.
 
-How each is judged is in `judging.py`: all by the truth, after the flight, from the history that is kept 50 times a second.
+How each is judged is in `judging.py`: all by the truth, after the flight, from the history that is kept at 50 Hz.
 """
 
 from typing import ClassVar, Self

@@ -13,7 +13,7 @@ from mission.console.terminal import loading
 SEED_MAX = 2**31 - 1
 
 
-def test(
+def fly_scenarios(
     paths: Annotated[
         list[Path] | None, typer.Argument(help="Scenario files, or folders of *.scenario.yaml.", show_default=False)
     ] = None,
@@ -48,7 +48,7 @@ def test(
         with learn_extra():
             with loading(Console(stderr=True)):
                 from mission.scenario.building import check_scenario
-                from mission.scenario.session import Planned, test_session
+                from mission.scenario.session import Planned, scenario_session
 
                 for file in scenarios:
                     check_scenario(file.scenario, str(file.path))
@@ -57,7 +57,7 @@ def test(
                 for file in scenarios
                 for seed in chosen or file.scenario.seeds
             ]
-            code = test_session(planned, jobs or len(os.sched_getaffinity(0)), junit=junit, is_quiet=quiet)
+            code = scenario_session(planned, jobs or len(os.sched_getaffinity(0)), junit=junit, is_quiet=quiet)
     except UserError as error:
         refuse(str(error))
     raise typer.Exit(code)

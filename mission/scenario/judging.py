@@ -7,6 +7,7 @@ and its worst moment. All by the truth: nothing of it went into the flight.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from math import inf, isfinite, nan
 from typing import Any
 
@@ -205,7 +206,7 @@ def _corridor(seen: Seen, check: c.Check, asked: c.Corridor) -> Judged:
         frames = seen.frames(check)
         points = history.pos_ned_true[frames].astype(float) * level
         line = [np.array(point, float) * level for point in asked.line]
-        legs = [segment_distance_m(points, a, b) for a, b in zip(line, line[1:], strict=False)]
+        legs = [segment_distance_m(points, a, b) for a, b in pairwise(line)]
         distance: Rows = np.min(legs, axis=0)
     else:
         plan, config = seen.vehicle.plan, seen.vehicle.flight.config

@@ -1,7 +1,7 @@
 """Flies a scenario in lockstep and judges it: `run_scenario(scenario)`. Start here.
 
-In: a `Scenario`, a seed, and where logs go. Out: a `ScenarioResult`, the same at each run of the same scenario and seed,
-and with a folder a ULog and a tlog of the same bytes.
+In: a `Scenario`, a seed, and where logs go. Out: a `ScenarioResult`, the same at each run of the same
+scenario and seed, and with a folder a ULog and a tlog of the same bytes.
 """
 
 import inspect

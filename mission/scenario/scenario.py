@@ -1,7 +1,7 @@
 """A scenario: the world, who flies in it, what goes wrong, and what is asked of the flight.
 
-A file `NAME.scenario.yaml` is one of these written down (`scenario_file.py`); Python makes the same objects. It is flown
-by `runner.run_scenario`. Light to import.
+A file `NAME.scenario.yaml` is one of these written down (`scenario_file.py`); Python makes the same objects. It is
+flown by `runner.run_scenario`. Light to import.
 """
 
 from pathlib import Path

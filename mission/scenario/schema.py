@@ -33,8 +33,8 @@ def reference_text() -> str:
 
 _HEADER = """# Keys of scenario files
 
-Written by `python -m docs.generate` from the models: do not edit. How they are used: [scenarios](../how-to/scenarios.md).
-The same for editors: [scenario.schema.json](scenario.schema.json).
+Written by `python -m docs.generate` from the models: do not edit. How they are used:
+[scenarios](../how-to/scenarios.md). The same for editors: [scenario.schema.json](scenario.schema.json).
 """
 
 
