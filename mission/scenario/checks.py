@@ -46,6 +46,15 @@ class Near(Part):
     """On the map, whatever its height."""
 
 
+class Away(Part):
+    """It stays away from a point."""
+
+    point: Point
+    min_m: float = Field(gt=0.0, le=10_000.0)
+    is_level: bool = False
+    """On the map, whatever its height."""
+
+
 class Arrives(Part):
     """It comes to a point."""
 
@@ -224,6 +233,7 @@ class Check(OneOf):
     """[m/s]"""
     corridor: Corridor | None = None
     near: Near | None = None
+    away: Away | None = None
     arrives: Arrives | None = None
     estimator: Estimator | None = None
     clearance: Clearance | None = None

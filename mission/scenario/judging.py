@@ -235,6 +235,12 @@ def _near(seen: Seen, check: c.Check, asked: c.Near) -> Judged:
     yield _most("distance", distance, seen.time_s[frames], asked.within_m, "m", what="from the point")
 
 
+def _away(seen: Seen, check: c.Check, asked: c.Away) -> Judged:
+    frames = seen.frames(check)
+    distance = _distances(seen, frames, asked.point, is_level=asked.is_level)
+    yield _least("distance", distance, seen.time_s[frames], asked.min_m, "m", what="from the point")
+
+
 def _arrives(seen: Seen, check: c.Check, asked: c.Arrives) -> Judged:
     frames = seen.frames(check)
     time_s, start_s = seen.time_s[frames], seen.ends(check)[0]
@@ -488,6 +494,7 @@ _JUDGES: dict[str, _Judge] = {
     **{name: _range_of(name) for name in ("altitude", "above_ground", "speed", "climb", "tilt", "airspeed")},
     "corridor": _corridor,
     "near": _near,
+    "away": _away,
     "arrives": _arrives,
     "estimator": _estimator,
     "clearance": _clearance,

@@ -122,6 +122,8 @@ VALUES: dict[str, Callable[[Moments], Rows]] = {
 
 
 def hold_now(flight: FlightBase, terms: tuple[Term, ...]) -> bool:
-    """Whether a condition holds at the present moment."""
+    """Whether a condition holds at the present moment; not before the vehicle's first estimate."""
+    if flight.controller.state.estimate is None:
+        return False
     now = moment_of(flight)
     return all(bool(term.holds(VALUES[term.quantity](now)[0])) for term in terms)

@@ -51,7 +51,7 @@ def run_scenario(
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     built = Built(scenario, seed, folder)
-    is_closed = False
+    is_closed, run = False, None
     try:
         run = _run_of(scenario, built)
         faults = FaultTimeline(run, scenario.faults)
@@ -66,6 +66,9 @@ def run_scenario(
         histories = built.close()
     finally:
         if not is_closed:
+            for vehicle in () if run is None else run.vehicles:
+                if vehicle.running is not None:
+                    vehicle.running.cancel()
             built.close()
     checks = judge(run, histories, simulated_s)
     result = ScenarioResult(
