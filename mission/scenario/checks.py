@@ -38,12 +38,20 @@ class Corridor(Part):
 
 
 class Near(Part):
-    """It stays near a point."""
+    """It stays near a point, or near another vehicle."""
 
-    point: Point
+    point: Point | None = None
+    to_vehicle: int | None = Field(default=None, ge=1, le=50)
+    """Near this one, from 1."""
     within_m: float = Field(gt=0.0, le=10_000.0)
     is_level: bool = False
     """On the map, whatever its height."""
+
+    @model_validator(mode="after")
+    def _has_one_place(self) -> Self:
+        if (self.point is None) == (self.to_vehicle is None):
+            raise ValueError("it is near either a point or a vehicle (to_vehicle)")
+        return self
 
 
 class Away(Part):

@@ -17,6 +17,7 @@ from mission.scenario.conditions import terms_of
 from mission.scenario.inline_plans import fence_plan_items, path_plan, survey_plan
 from mission.scenario.quantities import hold_now
 from mission.scenario.run import Run, VehicleRun
+from mission.scenario.target_camera import send_sightings
 from mission.script import fly_plan
 
 STICKS_S = 0.05
@@ -98,6 +99,13 @@ async def _offboard(vehicle: VehicleRun, for_s: float) -> None:
 
 async def _land(_: Run, vehicle: VehicleRun, step: s.Land) -> None:
     await vehicle.drone.land(step.timeout_s)
+
+
+async def _precision_land(run: Run, vehicle: VehicleRun, step: s.PrecisionLand) -> None:
+    await _set_mode(run, vehicle, s.SetMode(mode="precision_land"))
+    await send_sightings(run, vehicle, step)
+    if step.until is None:
+        await vehicle.drone.wait_disarmed(1.0)
 
 
 async def _return_home(_: Run, vehicle: VehicleRun, step: s.ReturnHome) -> None:
@@ -195,6 +203,7 @@ _ACTIONS: dict[str, Callable[[Run, VehicleRun, Any], Awaitable[None]]] = {
     "velocity": _velocity,
     "position": _position,
     "land": _land,
+    "precision_land": _precision_land,
     "return_home": _return_home,
     "fly_plan": _fly_plan,
     "fly_path": _fly_path,

@@ -20,6 +20,7 @@ from mission.log.flight_recorder import History
 from mission.log.flight_summary import cross_track_m, curved_items, planned_path, segment_distance_m
 from mission.scenario import checks as c
 from mission.scenario.conditions import QUANTITIES, Term, terms_of
+from mission.scenario.parts import Point
 from mission.scenario.quantities import VALUES, Moments, moments_of
 from mission.scenario.result import CheckResult
 from mission.scenario.run import Run, VehicleRun
@@ -223,7 +224,7 @@ def _corridor(seen: Seen, check: c.Check, asked: c.Corridor) -> Judged:
     yield _most("distance", distance[is_leg], time_s, asked.within_m, "m", percent=asked.percent, what="off the line")
 
 
-def _distances(seen: Seen, frames: Rows, point: c.Point, *, is_level: bool) -> Rows:
+def _distances(seen: Seen, frames: Rows, point: Point, *, is_level: bool) -> Rows:
     offset = seen.history.pos_ned_true[frames].astype(float) - np.array(point)
     distances: Rows = np.linalg.norm(offset[:, :2] if is_level else offset, axis=1)
     return distances
@@ -231,8 +232,16 @@ def _distances(seen: Seen, frames: Rows, point: c.Point, *, is_level: bool) -> R
 
 def _near(seen: Seen, check: c.Check, asked: c.Near) -> Judged:
     frames = seen.frames(check)
-    distance = _distances(seen, frames, asked.point, is_level=asked.is_level)
-    yield _most("distance", distance, seen.time_s[frames], asked.within_m, "m", what="from the point")
+    if asked.to_vehicle is None:
+        distance = _distances(seen, frames, asked.point or (0.0, 0.0, 0.0), is_level=asked.is_level)
+        yield _most("distance", distance, seen.time_s[frames], asked.within_m, "m", what="from the point")
+        return
+    other = seen.others[asked.to_vehicle - 1].history
+    _, mine, theirs = np.intersect1d(seen.history.time_us[frames], other.time_us, return_indices=True)
+    offset = seen.history.pos_ned_true[frames][mine].astype(float) - other.pos_ned_true[theirs]
+    gap = np.linalg.norm(offset[:, :2] if asked.is_level else offset, axis=1)
+    what = f"from vehicle {asked.to_vehicle}"
+    yield _most("distance", gap, seen.time_s[frames][mine], asked.within_m, "m", what=what)
 
 
 def _away(seen: Seen, check: c.Check, asked: c.Away) -> Judged:

@@ -13,7 +13,8 @@ def junit_text(results: Sequence[ScenarioResult]) -> bytes:
     for result in results:
         _suite(root, result)
     indent(root)
-    return b'<?xml version="1.0" encoding="utf-8"?>\n' + tostring(root, encoding="utf-8") + b"\n"
+    written: bytes = tostring(root, encoding="utf-8")
+    return b'<?xml version="1.0" encoding="utf-8"?>\n' + written + b"\n"
 
 
 def _suite(root: Element, result: ScenarioResult) -> None:

@@ -5,7 +5,7 @@ that is waited for in flight and a check after it use the same functions.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -41,7 +41,8 @@ class Moments:
 
 def moments_of(history: History, world: WorldMap) -> Moments:
     """Those of a whole flight."""
-    return Moments(*(getattr(history, name) for name in Moments.__slots__ if name != "world"), world)
+    columns = {each.name: getattr(history, each.name) for each in fields(Moments) if each.name != "world"}
+    return Moments(**columns, world=world)
 
 
 def moment_of(flight: FlightBase) -> Moments:
@@ -82,11 +83,13 @@ def _euler(q: Rows, axis: int) -> Rows:
 
 def _position_error(m: Moments) -> Rows:
     error = m.pos_ned_est[:, :2].astype(float) - m.pos_ned_true[:, :2]
-    return np.hypot(*error.T)
+    distance: Rows = np.hypot(*error.T)
+    return distance
 
 
 def _attitude_error(m: Moments) -> Rows:
-    return rotation_error_ned(m.q_est.astype(float), m.q_true.astype(float))
+    error: Rows = rotation_error_ned(m.q_est.astype(float), m.q_true.astype(float))
+    return error
 
 
 def _above_ground(m: Moments) -> Rows:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from autopilot.interface.vehicle_state import Severity
+from common.attitude import Vector
 from mission.client import Running
 from mission.flight import Flight
 from mission.plan.plan_file import Plan
@@ -111,6 +112,11 @@ class Run:
     @property
     def time_s(self) -> float:
         return round(self.vehicles[0].flight.time_us * 1e-6, 6)
+
+    def pos_ned(self, number: int) -> Vector:
+        """[m] The true position of a vehicle, from 1."""
+        north, east, down = (float(v) for v in self.vehicles[number - 1].flight.rig.rows["truth"][0]["pos_ned"])
+        return north, east, down
 
     def mark(self, name: str) -> None:
         """Gives this moment a name; the first of a name counts."""

@@ -10,9 +10,9 @@ import sys
 from collections.abc import Callable
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from time import process_time
 from typing import Any
 
+from common.clock import process_time_s
 from common.files import write_whole
 from mission.client import ScriptError
 from mission.console.option_checks import UserError
@@ -46,7 +46,7 @@ def run_scenario(
     Raises:
         UserError: it cannot be flown as it is: no such airframe, parameter, policy, plan or function.
     """
-    begun_s = process_time()
+    begun_s = process_time_s()
     seed = scenario.seeds[0] if seed is None else seed
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -78,7 +78,7 @@ def run_scenario(
         checks=checks,
         error=error,
         simulated_s=simulated_s,
-        cpu_s=process_time() - begun_s,
+        cpu_s=process_time_s() - begun_s,
         texts=tuple(
             sorted((time_s, vehicle.number, text) for vehicle in run.vehicles for time_s, text in vehicle.witness.texts)
         ),
@@ -177,7 +177,7 @@ def _fly(run: Run, built: Built, faults: FaultTimeline) -> None:
             witness.look()
         if over_us == end_us and running and all(each.is_done for each in running):
             over_us = min(time_us + round(AFTER_S * 1e6), end_us - 1)
-        return time_us >= over_us
+        return bool(time_us >= over_us)
 
     flown: Any = built.flights[0] if built.fleet is None else built.fleet
     flown.run(is_over)

@@ -60,7 +60,9 @@ def fly(planned: Planned) -> Flown:
     return Flown(result, command=keep_scenario(folder, planned.scenario, planned.seed))
 
 
-def scenario_session(planned: Sequence[Planned], jobs: int, *, junit: Path | None = None, is_quiet: bool = False) -> int:
+def scenario_session(
+    planned: Sequence[Planned], jobs: int, *, junit: Path | None = None, is_quiet: bool = False
+) -> int:
     """Flies all, shows and writes the results; the exit code: 0 all passed, 1 some failed, 2 one cannot be flown."""
     console = Console()
     flown = _flown(planned, min(jobs, len(planned)), console)

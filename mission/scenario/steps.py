@@ -1,9 +1,9 @@
 """The steps that a vehicle is told to do, one after the other. Light to import."""
 
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from mission.scenario.conditions import Condition
 from mission.scenario.parts import Finite, Metres, OneOf, Part, Place, Point, Seconds, Short
@@ -99,6 +99,24 @@ class Land(Short):
 
     short: ClassVar[str] = "timeout_s"
     timeout_s: Seconds = 180.0
+
+
+class PrecisionLand(Part):
+    """Lands on a target that a camera under it sees, ten times a second with 0.01 rad of noise."""
+
+    target_ne_m: Place | None = None
+    """Where it lies on the ground; or else `target_vehicle`."""
+    target_vehicle: int | None = Field(default=None, ge=1, le=50)
+    """The vehicle that carries it, from 1."""
+    until: Condition | None = None
+    """Goes on with the script when this holds; left out: when it has landed."""
+    timeout_s: Seconds = 180.0
+
+    @model_validator(mode="after")
+    def _has_one_target(self) -> Self:
+        if (self.target_ne_m is None) == (self.target_vehicle is None):
+            raise ValueError("a target is either target_ne_m (a place) or target_vehicle")
+        return self
 
 
 class ReturnHome(Short):
@@ -226,6 +244,7 @@ class Step(OneOf):
     velocity: Velocity | None = None
     position: Position | None = None
     land: Land | None = None
+    precision_land: PrecisionLand | None = None
     return_home: ReturnHome | None = None
     fly_plan: FlyPlan | None = None
     fly_path: FlyPath | None = None
