@@ -47,7 +47,7 @@ def fly_scenarios(
             raise UserError(f"--junit {junit}: no such folder")
         with learn_extra():
             with loading(Console(stderr=True)):
-                from mission.scenario.building import check_scenario
+                from mission.scenario.flight.building import check_scenario
                 from mission.scenario.session import Planned, scenario_session
 
                 for file in scenarios:

@@ -18,12 +18,12 @@ from mission.client import ScriptError
 from mission.console.option_checks import UserError
 from mission.log.flight_summary import planned_path
 from mission.plan.plan_file import PlanError, read_plan
-from mission.scenario.building import Built
-from mission.scenario.fault_timeline import FaultTimeline
-from mission.scenario.flying import fly_steps
-from mission.scenario.judging import judge
+from mission.scenario.flight.building import Built
+from mission.scenario.flight.fault_timeline import FaultTimeline
+from mission.scenario.flight.flying import fly_steps
+from mission.scenario.flight.run import Run, VehicleRun, Witness
+from mission.scenario.judging.judge import judge
 from mission.scenario.result import ScenarioResult
-from mission.scenario.run import Run, VehicleRun, Witness
 from mission.scenario.scenario import Scenario, Vehicle
 from mission.script import fly_plan
 from mission.view.replay_file import keep_for_replay

@@ -10,10 +10,10 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from mission.flight_settings import EngineName, Pace, WorldKind
-from mission.scenario.checks import Check
-from mission.scenario.faults import Fault
-from mission.scenario.parts import Finite, Part, Place
-from mission.scenario.steps import Step
+from mission.scenario.parts.checks import Check
+from mission.scenario.parts.faults import Fault
+from mission.scenario.parts.part import Finite, Part, Place
+from mission.scenario.parts.steps import Step
 
 VEHICLES_MAX = 50
 

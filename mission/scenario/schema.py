@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from mission.scenario.conditions import QUANTITIES
+from mission.scenario.parts.conditions import QUANTITIES
 from mission.scenario.scenario import Scenario
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

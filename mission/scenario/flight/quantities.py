@@ -15,7 +15,7 @@ from mission.flight_base import FlightBase
 from mission.log.euler_angles import euler_rad
 from mission.log.flight_recorder import History
 from mission.log.flight_summary import rotation_error_ned
-from mission.scenario.conditions import Term
+from mission.scenario.parts.conditions import Term
 from sim.world.world import WorldMap
 
 Rows = npt.NDArray[Any]

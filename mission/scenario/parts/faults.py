@@ -7,8 +7,8 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from mission.scenario.conditions import Condition
-from mission.scenario.parts import OneOf, Part, Seconds, Short
+from mission.scenario.parts.conditions import Condition
+from mission.scenario.parts.part import OneOf, Part, Seconds, Short
 
 SensorName = Literal[
     "gyro", "accel", "mag", "baro", "gnss", "range", "wheels", "airspeed", "battery",

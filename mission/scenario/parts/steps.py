@@ -5,8 +5,8 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from mission.scenario.conditions import Condition
-from mission.scenario.parts import Finite, Metres, OneOf, Part, Place, Point, Seconds, Short
+from mission.scenario.parts.conditions import Condition
+from mission.scenario.parts.part import Finite, Metres, OneOf, Part, Place, Point, Seconds, Short
 
 ModeName = Literal[
     "hold", "takeoff", "mission", "return", "land", "offboard", "manual", "stabilized", "acro", "altitude", "position",

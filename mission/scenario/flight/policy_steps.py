@@ -8,8 +8,8 @@ from mission.client import ScriptError
 from mission.follow.follow_scoring import FollowWatch
 from mission.park.park_session import pose_in
 from mission.park.parking import drive, get_ready
-from mission.scenario.run import Run, VehicleRun
-from mission.scenario.steps import LetPolicyFly, PolicyGoto, PolicyPark
+from mission.scenario.flight.run import Run, VehicleRun
+from mission.scenario.parts.steps import LetPolicyFly, PolicyGoto, PolicyPark
 from mission.script import CMD_REPOSITION, FRAME_GLOBAL
 from policies.companion.engagement import Phase
 from policies.companion.vehicle_link import COMPONENT

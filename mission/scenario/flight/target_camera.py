@@ -6,10 +6,10 @@ import numpy as np
 
 from common.attitude import Vector
 from mission.client import ScriptTimeout
-from mission.scenario.conditions import terms_of
-from mission.scenario.quantities import hold_now
-from mission.scenario.run import Run, VehicleRun
-from mission.scenario.steps import PrecisionLand
+from mission.scenario.flight.quantities import hold_now
+from mission.scenario.flight.run import Run, VehicleRun
+from mission.scenario.parts.conditions import terms_of
+from mission.scenario.parts.steps import PrecisionLand
 
 PERIOD_S, NOISE_RAD = 0.1, 0.01
 NEAREST_M = 0.05  # nearer, it sees nothing

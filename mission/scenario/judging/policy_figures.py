@@ -5,12 +5,12 @@ from math import nan
 
 import numpy as np
 
-from mission.scenario.checks import Following
+from mission.scenario.parts.checks import Following
 from mission.scenario.result import CheckResult
 from policies.tasks.follow_me.track import Ranges, Track
 
 
-def following(track: Track, asked: Following) -> Iterator[CheckResult]:
+def following_figures(track: Track, asked: Following) -> Iterator[CheckResult]:
     """A result for each figure that is asked for."""
     ranges = Ranges()
     distance = track.distance_m

@@ -12,12 +12,12 @@ from autopilot.mavlink.dialects.px4 import PX4
 from mission.client import ScriptError
 from mission.plan.plan_file import read_plan
 from mission.plan.plan_lists import FENCE_LIST
-from mission.scenario import steps as s
-from mission.scenario.conditions import terms_of
-from mission.scenario.inline_plans import fence_plan_items, path_plan, survey_plan
-from mission.scenario.quantities import hold_now
-from mission.scenario.run import Run, VehicleRun
-from mission.scenario.target_camera import send_sightings
+from mission.scenario.flight.inline_plans import fence_plan_items, path_plan, survey_plan
+from mission.scenario.flight.quantities import hold_now
+from mission.scenario.flight.run import Run, VehicleRun
+from mission.scenario.flight.target_camera import send_sightings
+from mission.scenario.parts import steps as s
+from mission.scenario.parts.conditions import terms_of
 from mission.script import fly_plan
 
 STICKS_S = 0.05
@@ -173,7 +173,7 @@ async def _send_sticks(vehicle: VehicleRun) -> None:
 async def _by_policy(name: str, run: Run, vehicle: VehicleRun, step: Any) -> None:
     if run.companion is None:
         raise ScriptError("the vehicle has no policy")
-    from mission.scenario import policy_steps
+    from mission.scenario.flight import policy_steps
 
     action: Callable[..., Awaitable[None]] = getattr(policy_steps, name)
     await action(run, vehicle, step)

@@ -7,9 +7,9 @@ from typing import ClassVar, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from mission.scenario.conditions import Condition
-from mission.scenario.parts import Finite, Metres, OneOf, Part, Place, Point, Seconds, Short
-from mission.scenario.steps import ModeName
+from mission.scenario.parts.conditions import Condition
+from mission.scenario.parts.part import Finite, Metres, OneOf, Part, Place, Point, Seconds, Short
+from mission.scenario.parts.steps import ModeName
 
 
 class Range(Part):

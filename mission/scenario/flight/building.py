@@ -195,7 +195,7 @@ class Built:
         policy = scenario.fleet[0].policy
         if policy is None:
             return Flight(config, links=links, folder=folder)
-        from mission.scenario.companions import flight_with_policy
+        from mission.scenario.flight.companions import flight_with_policy
 
         flight, self.companion = flight_with_policy(config, policy, links, folder)
         return flight

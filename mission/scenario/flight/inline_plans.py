@@ -6,7 +6,7 @@ from math import nan
 from common.geodesy import GeoPoint, geodetic_from_ned
 from mission.plan.plan_file import FenceCircle, FencePolygon, Plan, PlanItem
 from mission.plan.plan_lists import fence_items
-from mission.scenario.steps import Fence, FlyPath, Survey
+from mission.scenario.parts.steps import Fence, FlyPath, Survey
 
 WAYPOINT, RETURN, LAND, TAKEOFF, SPLINE, CHANGE_SPEED = 16, 20, 21, 22, 82, 178  # MAV_CMD
 ABOVE_HOME, NO_FRAME = 3, 2  # MAV_FRAME

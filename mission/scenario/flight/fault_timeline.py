@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 from mission.console.option_checks import UserError
-from mission.scenario.building import set_charge
-from mission.scenario.conditions import Term, terms_of
-from mission.scenario.faults import Fault
-from mission.scenario.quantities import hold_now
-from mission.scenario.run import Run, VehicleRun
+from mission.scenario.flight.building import set_charge
+from mission.scenario.flight.quantities import hold_now
+from mission.scenario.flight.run import Run, VehicleRun
+from mission.scenario.parts.conditions import Term, terms_of
+from mission.scenario.parts.faults import Fault
 from sim.faults import set_fault
 
 LOOK_US = 100_000  # between looks at conditions
