@@ -13,6 +13,7 @@ from docs.generate.mavlink_page import mavlink_text
 from docs.generate.tasks_page import tasks_text
 from docs.generate.training_page import training_text
 from mission.flight import Flight, FlightConfig
+from mission.scenario.schema import reference_text, schema_text
 from mission.simulator.simulator_params import simulator_parameters
 from sim.bodies.vehicles import class_of
 
@@ -104,6 +105,8 @@ def generated_pages() -> dict[Path, str]:
         REFERENCE / "mavlink.md": mavlink_text(Flight(FlightConfig()).server),
         REFERENCE / "training-config.md": training_text(),
         REFERENCE / "tasks.md": tasks_text(),
+        REFERENCE / "scenario-keys.md": reference_text(),
+        REFERENCE / "scenario.schema.json": schema_text(),
     }
 
 

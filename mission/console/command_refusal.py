@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 
 LEARN_PACKAGES = {
-    *("av", "filterpy", "gymnasium", "h5py", "minari", "onnx", "onnxruntime", "pygame", "tensorboard", "torch", "yaml"),
+    *("av", "filterpy", "gymnasium", "h5py", "minari", "onnx", "onnxruntime", "pygame", "tensorboard", "torch"),
 }
 _ERRORS = Console(stderr=True, soft_wrap=True, highlight=False)
 

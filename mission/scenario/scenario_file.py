@@ -9,8 +9,8 @@ from pydantic import ValidationError
 
 from mission.console.option_checks import UserError
 from mission.scenario.scenario import Scenario
-from policies.learn.config.refusal import sentence
-from policies.learn.config.yaml_locations import ConfigError, Located, location_at, parse_yaml
+from common.config.refusal import sentence
+from common.config.yaml_locations import ConfigError, Located, location_at, parse_yaml
 
 SUFFIX = ".scenario.yaml"
 READY = Path(__file__).parent / "ready"

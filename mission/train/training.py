@@ -20,7 +20,7 @@ from policies.learn.config.load import Loaded, load_config
 from policies.learn.config.recipes import recipe
 from policies.learn.config.run import RunConfig
 from policies.learn.config.task_check import check_against_task
-from policies.learn.config.yaml_locations import ConfigError
+from common.config.yaml_locations import ConfigError
 from policies.learn.evaluate import Evaluation, evaluate
 from policies.learn.export.onnx_export import ExportError, export_policy
 from policies.learn.export.policy_file import load_policy

@@ -21,8 +21,6 @@ from mission.flight_config import AIRFIELD, TREELESS_M, FlightConfig, OwnerConfi
 from mission.plan.plan_file import PlanError, read_plan
 from mission.scenario.scenario import Scenario, Vehicle, World
 from mission.simulator.flight_rig import flight_world
-from policies.learn.export.policy_path import CheckpointError, find_policy
-from policies.tasks.follow_me.world import FOLLOW_WORLD
 from sim.bodies.vehicles import class_of
 from sim.world.driving_worlds import CAR_PARK, COURSE
 from sim.world.forest_world import FOREST, WALLED_FOREST
@@ -32,7 +30,6 @@ KINDS = {
     "hills": WorldConfig(treeless_radius_m=TREELESS_M),
     "plain": WorldConfig(hill_height_m=0.0, trees_per_ha=0.0),
     "airfield": AIRFIELD,
-    "follow": FOLLOW_WORLD,
     "forest": FOREST.model_copy(update={"trees_per_ha": 400.0}),
     "walled-forest": WALLED_FOREST,
     "course": COURSE,
@@ -57,6 +54,15 @@ class GroundStation:
             self._client.keep_alive(time_us)
 
 
+def _kind(name: str) -> WorldConfig:
+    """The world that a kind stands for."""
+    if name == "follow":
+        from policies.tasks.follow_me.world import FOLLOW_WORLD
+
+        return FOLLOW_WORLD
+    return KINDS[name]
+
+
 def world_config(world: World) -> WorldConfig:
     """The ground as the world module has it.
 
@@ -67,7 +73,7 @@ def world_config(world: World) -> WorldConfig:
         raise UserError("world.file: world files cannot be flown yet")
     given = {k: v for k, v in world.model_dump(exclude={"kind", "file"}).items() if v is not None}
     try:
-        return WorldConfig(**{**KINDS[world.kind].model_dump(), **given})
+        return WorldConfig(**{**_kind(world.kind).model_dump(), **given})
     except ValueError as error:
         raise UserError(f"world: {error}") from error
 
@@ -114,9 +120,11 @@ def check_scenario(scenario: Scenario, file: str) -> None:
                     read_plan(plan)
             if vehicle.python is not None and not Path(vehicle.python.rpartition(":")[0]).is_file():
                 raise UserError(f"{vehicle.python}: no such file")
-            if vehicle.policy is not None and vehicle.policy.name != "scripted":
-                find_policy(vehicle.policy.name)
-    except (UserError, PlanError, CheckpointError) as error:
+            if vehicle.policy is not None:
+                from mission.scenario.flight.companions import check_policy
+
+                check_policy(vehicle.policy)
+    except (UserError, PlanError) as error:
         raise UserError(f"{file}: {error}") from error
 
 

@@ -19,6 +19,19 @@ from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import CheckpointError, find_policy
 
 
+def check_policy(policy: Policy) -> None:
+    """Refuses a policy that is not there.
+
+    Raises:
+        UserError: it is not.
+    """
+    try:
+        if policy.name != SCRIPTED:
+            find_policy(policy.name)
+    except CheckpointError as error:
+        raise UserError(str(error)) from error
+
+
 def flight_with_policy(
     config: FlightConfig, policy: Policy, links: Sequence[Link], folder: Path | None
 ) -> tuple[Flight, Companion]:

@@ -13,9 +13,9 @@ from pydantic import ValidationError
 
 from policies.learn.config.ignored_keys import put_right
 from policies.learn.config.old_form import behavior_from_flat, flat_names, is_flat, parameters_from_old
-from policies.learn.config.refusal import sentence, unknown_key
+from common.config.refusal import sentence, unknown_key
 from policies.learn.config.run import RunConfig
-from policies.learn.config.yaml_locations import (
+from common.config.yaml_locations import (
     ConfigError,
     Located,
     Location,

@@ -6,7 +6,7 @@ from policies.learn.config.environment import CompletionCriteria, Curriculum, En
 from policies.learn.config.load import Loaded
 from policies.learn.config.network import NetworkSettings
 from policies.learn.config.run import CheckpointSettings, RunConfig, TorchSettings
-from policies.learn.config.yaml_locations import ConfigError
+from common.config.yaml_locations import ConfigError
 
 FILE = RunConfig(
     behavior_name="Car",

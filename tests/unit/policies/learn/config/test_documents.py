@@ -7,7 +7,7 @@ from policies.learn.config.load import load_config
 from policies.learn.config.network import Memory, NetworkSettings
 from policies.learn.config.run import RunConfig
 from policies.learn.config.signals import ExtrinsicSettings, GailSettings, RewardSignals
-from policies.learn.config.yaml_locations import ConfigError
+from common.config.yaml_locations import ConfigError
 
 DATA = Path(__file__).parent / "data"
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from policies.learn.config.behavior import Behavior
 from policies.learn.config.load import load_config
 from policies.learn.config.signals import CuriositySettings, ExtrinsicSettings
-from policies.learn.config.yaml_locations import ConfigError, parse_yaml
+from common.config.yaml_locations import ConfigError, parse_yaml
 
 CAR = """\
 behaviors:

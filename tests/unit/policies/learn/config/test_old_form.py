@@ -13,7 +13,7 @@ from policies.learn.config.environment import (
 )
 from policies.learn.config.load import load_config
 from policies.learn.config.network import Memory
-from policies.learn.config.yaml_locations import ConfigError
+from common.config.yaml_locations import ConfigError
 
 FLAT = """\
 default:
