@@ -32,7 +32,7 @@ async def fly_steps(run: Run, vehicle: VehicleRun, steps: Sequence[s.Step]) -> N
     await vehicle.drone.wait_ready()
     for number, step in enumerate(steps, 1):
         try:
-            await _ACTIONS[step.name_chosen](run, vehicle, step.chosen)
+            await ACTIONS[step.name_chosen](run, vehicle, step.chosen)
         except ScriptError as error:
             raise ScriptError(f"step {number}, {step.name_chosen}: {error}") from error
 
@@ -191,7 +191,7 @@ async def _policy_park(run: Run, vehicle: VehicleRun, step: s.PolicyPark) -> Non
     await _by_policy("park", run, vehicle, step)
 
 
-_ACTIONS: dict[str, Callable[[Run, VehicleRun, Any], Awaitable[None]]] = {
+ACTIONS: dict[str, Callable[[Run, VehicleRun, Any], Awaitable[None]]] = {
     "arm": _arm,
     "disarm": _disarm,
     "takeoff": _takeoff,

@@ -36,7 +36,7 @@ def judge(run: Run, histories: Sequence[History], end_s: float) -> tuple[CheckRe
 def _results(seen: Seen, check: c.Check) -> list[CheckResult]:
     title = check.name or check.name_chosen.replace("_", " ")
     try:
-        results = list(_JUDGES[check.name_chosen](seen, check, check.chosen))
+        results = list(JUDGES[check.name_chosen](seen, check, check.chosen))
     except NothingToJudge as nothing:
         return [CheckResult(title, passed=False, asked=_said(check), happened=str(nothing))]
     several = len(results) > 1
@@ -48,7 +48,7 @@ def _said(check: c.Check) -> str:
     return ", ".join(f"{key} {value}" for key, value in given.items())
 
 
-_JUDGES: dict[str, Judge] = {
+JUDGES: dict[str, Judge] = {
     **{
         name: motion_checks.range_of(name)
         for name in ("altitude", "above_ground", "speed", "climb", "tilt", "airspeed")
