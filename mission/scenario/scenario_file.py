@@ -7,10 +7,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from mission.console.option_checks import UserError
-from mission.scenario.scenario import Scenario
 from common.config.refusal import sentence
 from common.config.yaml_locations import ConfigError, Located, location_at, parse_yaml
+from mission.console.option_checks import UserError
+from mission.scenario.scenario import Scenario
 
 SUFFIX = ".scenario.yaml"
 READY = Path(__file__).parent / "ready"

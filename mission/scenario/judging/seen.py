@@ -84,7 +84,7 @@ class Seen:
         """
         start_s, end_s = self.ends(check)
         frames: Rows = (self.time_s >= start_s) & (self.time_s <= end_s)
-        if only_armed and check.from_ is None and check.to is None:
+        if only_armed:
             frames = frames & self.has_flown
         if check.during is not None:
             frames = frames & self.history.is_armed & (self.history.mode == int(Mode[check.during.upper()]))

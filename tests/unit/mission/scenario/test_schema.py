@@ -7,8 +7,8 @@ import yaml
 
 from mission.scenario.parts.checks import Check
 from mission.scenario.parts.steps import Step
-from mission.scenario.schema import reference_text, scenario_schema, schema_text
 from mission.scenario.scenario_file import READY, find_files
+from mission.scenario.schema import reference_text, scenario_schema, schema_text
 
 
 def takes(schema, value, root):
