@@ -7,6 +7,7 @@ scenario and seed, and with a folder a ULog and a tlog of the same bytes.
 import inspect
 import json
 import sys
+import traceback
 from collections.abc import Callable
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -120,10 +121,27 @@ def _order(run: Run, vehicle: VehicleRun, config: Vehicle) -> Any:
             raise UserError(str(error)) from error
         return fly_plan(vehicle.drone, vehicle.plan)
     if config.python is not None:
-        function = function_of(config.python)
-        has_run = len(inspect.signature(function).parameters) > 1
-        return function(vehicle.drone, run) if has_run else function(vehicle.drone)
+        return _python(config.python, run, vehicle)
     return fly_steps(run, vehicle, config.script) if config.script else None
+
+
+def _python(text: str, run: Run, vehicle: VehicleRun) -> Any:
+    """The coroutine of somebody's own; what it raises is its error, not ours."""
+    function = function_of(text)
+    has_run = len(inspect.signature(function).parameters) > 1
+
+    async def flown() -> None:
+        try:
+            await (function(vehicle.drone, run) if has_run else function(vehicle.drone))
+        except ScriptError:
+            raise
+        except Exception as error:
+            own = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in text]
+            raise ScriptError(
+                f"{text}, line {own[-1].lineno if own else 0}: {type(error).__name__}: {error}"
+            ) from error
+
+    return flown()
 
 
 def function_of(text: str) -> Callable[..., Any]:
@@ -143,6 +161,8 @@ def function_of(text: str) -> Callable[..., Any]:
     sys.path.insert(0, str(path.parent))
     try:
         spec.loader.exec_module(module)
+    except Exception as error:
+        raise UserError(f"{file}: cannot be imported: {type(error).__name__}: {error}") from error
     finally:
         sys.path.remove(str(path.parent))
     function: Any = getattr(module, name, None)

@@ -4,6 +4,7 @@ A file `NAME.scenario.yaml` is one of these written down (`scenario_file.py`); P
 flown by `runner.run_scenario`. Light to import.
 """
 
+import difflib
 from pathlib import Path
 from typing import Literal, Self
 
@@ -16,6 +17,7 @@ from mission.scenario.parts.part import Finite, Part, Place
 from mission.scenario.parts.steps import Step
 
 VEHICLES_MAX = 50
+ITEM_MARK = "item "  # of a mission: the moment is when it is reached
 
 
 class World(Part):
@@ -181,7 +183,21 @@ class Scenario(Part):
         for check in self.checks:
             if check.vehicle is not None and check.vehicle > len(fleet):
                 raise ValueError(f"checks: there is no vehicle {check.vehicle}")
+        self._check_marks()
         return self
+
+    def _check_marks(self) -> None:
+        """Refuses a mark that nothing makes; Python may make any."""
+        if any(vehicle.python for vehicle in self.fleet):
+            return
+        steps = [step for vehicle in self.fleet for step in vehicle.script]
+        known = {step.mark.name for step in steps if step.mark} | {fault.mark for fault in self.faults if fault.mark}
+        for number, check in enumerate(self.checks):
+            for end in (check.from_, check.to):
+                if isinstance(end, str) and end not in known and not end.startswith(ITEM_MARK):
+                    near = difflib.get_close_matches(end, known, n=1)
+                    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(sorted(known)) or 'none'}"
+                    raise ValueError(f"checks[{number}]: nothing makes a mark '{end}'; {hint}")
 
     @property
     def fleet(self) -> tuple[Vehicle, ...]:

@@ -65,7 +65,11 @@ def scenario_session(
 ) -> int:
     """Flies all, shows and writes the results; the exit code: 0 all passed, 1 some failed, 2 one cannot be flown."""
     console = Console()
-    flown = _flown(planned, min(jobs, len(planned)), console)
+    try:
+        flown = _flown(planned, min(jobs, len(planned)), console)
+    except KeyboardInterrupt:
+        print_line(console, "stopped by the user")
+        return 1
     refusals = [each.refusal for each in flown if each.refusal]
     results = [each.result for each in flown if each.result is not None]
     if not is_quiet:
@@ -100,10 +104,20 @@ def _flown(planned: Sequence[Planned], jobs: int, console: Console) -> list[Flow
                 note(index, fly(each))
         else:
             with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
-                futures = {pool.submit(fly, each): index for index, each in enumerate(planned)}
-                for future in as_completed(futures):
-                    note(futures[future], future.result())
+                order = sorted(range(len(planned)), key=lambda index: -_weight(planned[index].scenario))
+                futures = {pool.submit(fly, planned[index]): index for index in order}
+                try:
+                    for future in as_completed(futures):
+                        note(futures[future], future.result())
+                except KeyboardInterrupt:
+                    pool.shutdown(wait=False, cancel_futures=True)
+                    raise
     return [done[index] for index in range(len(planned))]
+
+
+def _weight(scenario: Scenario) -> int:
+    """How much there is to do in it, roughly: who takes long begins first."""
+    return len(scenario.fleet) + (20 if scenario.owner else 0) + (10 if scenario.fleet[0].policy else 0)
 
 
 def _table(results: Sequence[ScenarioResult]) -> Table:

@@ -10,7 +10,7 @@ from typing import Any
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects.px4 import PX4
 from mission.client import ScriptError
-from mission.plan.plan_file import read_plan
+from mission.plan.plan_file import Plan, read_plan
 from mission.plan.plan_lists import FENCE_LIST
 from mission.scenario.flight.inline_plans import fence_plan_items, path_plan, survey_plan
 from mission.scenario.flight.quantities import hold_now
@@ -18,7 +18,7 @@ from mission.scenario.flight.run import Run, VehicleRun
 from mission.scenario.flight.target_camera import send_sightings
 from mission.scenario.parts import steps as s
 from mission.scenario.parts.conditions import terms_of
-from mission.script import fly_plan
+from mission.script import fly_plan, start_plan
 
 STICKS_S = 0.05
 
@@ -113,20 +113,27 @@ async def _return_home(_: Run, vehicle: VehicleRun, step: s.ReturnHome) -> None:
     await vehicle.drone.wait_disarmed(step.timeout_s)
 
 
+async def _mission(vehicle: VehicleRun, plan: Plan, *, waits: bool) -> None:
+    vehicle.plan = plan
+    if waits:
+        await fly_plan(vehicle.drone, plan)
+    else:
+        await start_plan(vehicle.drone, plan)
+
+
 async def _fly_plan(_: Run, vehicle: VehicleRun, step: s.FlyPlan) -> None:
-    vehicle.plan = read_plan(step.file)
-    await fly_plan(vehicle.drone, vehicle.plan)
+    await _mission(vehicle, read_plan(step.file), waits=step.waits)
 
 
 async def _fly_path(_: Run, vehicle: VehicleRun, step: s.FlyPath) -> None:
     flight = vehicle.flight
-    vehicle.plan = path_plan(step, flight.config.home, drives=flight.drives, start_ne_m=flight.config.start_ne_m)
-    await fly_plan(vehicle.drone, vehicle.plan)
+    plan = path_plan(step, flight.config.home, drives=flight.drives, start_ne_m=flight.config.start_ne_m)
+    await _mission(vehicle, plan, waits=step.waits)
 
 
 async def _survey(_: Run, vehicle: VehicleRun, step: s.Survey) -> None:
-    vehicle.plan = survey_plan(step, vehicle.flight.config.home, drives=vehicle.flight.drives)
-    await fly_plan(vehicle.drone, vehicle.plan)
+    plan = survey_plan(step, vehicle.flight.config.home, drives=vehicle.flight.drives)
+    await _mission(vehicle, plan, waits=step.waits)
 
 
 async def _fence(_: Run, vehicle: VehicleRun, step: s.Fence) -> None:

@@ -18,9 +18,9 @@ from mission.scenario.flight.quantities import Moments, moments_of
 from mission.scenario.flight.run import Run, VehicleRun
 from mission.scenario.parts import checks as c
 from mission.scenario.result import CheckResult
+from mission.scenario.scenario import ITEM_MARK
 
 Rows = npt.NDArray[Any]
-ITEM = "item "  # of a mission, whose moment is when it is reached
 Judged = Iterator[CheckResult]
 
 
@@ -62,8 +62,8 @@ class Seen:
         if given is None:
             return without
         if isinstance(given, str):
-            if given.startswith(ITEM):
-                found = [at for at, seq in self.vehicle.witness.reached if str(seq) == given.removeprefix(ITEM)]
+            if given.startswith(ITEM_MARK):
+                found = [at for at, seq in self.vehicle.witness.reached if str(seq) == given.removeprefix(ITEM_MARK)]
                 if not found:
                     raise NothingToJudge(f"'{given}' was never reached")
                 return found[0]

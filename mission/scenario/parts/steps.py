@@ -126,7 +126,14 @@ class ReturnHome(Short):
     timeout_s: Seconds = 300.0
 
 
-class FlyPlan(Short):
+class _Mission(Part):
+    """What missions have in common."""
+
+    waits: bool = True
+    """Until its end; else the script goes on as soon as the mission has begun."""
+
+
+class FlyPlan(Short, _Mission):
     """Uploads a plan with its fence and rally points, and flies it to its end."""
 
     short: ClassVar[str] = "file"
@@ -134,7 +141,7 @@ class FlyPlan(Short):
     """A QGroundControl .plan or QGC WPL 110 file, from the folder of the scenario."""
 
 
-class FlyPath(Part):
+class FlyPath(_Mission):
     """Uploads a mission through points, starts it and flies it to its end; what flies takes off first."""
 
     points: tuple[Point, ...] = Field(min_length=1, max_length=500)
@@ -143,10 +150,9 @@ class FlyPath(Part):
     speed_m_s: float | None = Field(default=None, gt=0.0, le=100.0)
     end: Literal["land", "return", "hold"] = "land"
     """At the last point."""
-    timeout_s: Seconds = 1800.0
 
 
-class Survey(Part):
+class Survey(_Mission):
     """Uploads a mission to and fro over a rectangle, starts it and flies it to its return home."""
 
     corner_ne_m: Place = (0.0, 0.0)
@@ -157,7 +163,6 @@ class Survey(Part):
     points_per_line: int = Field(default=2, ge=2, le=100)
     height_m: float = Field(default=15.0, gt=0.0, le=1000.0)
     speed_m_s: float | None = Field(default=None, gt=0.0, le=100.0)
-    timeout_s: Seconds = 1800.0
 
 
 class Fence(Part):

@@ -40,7 +40,7 @@ def hop():
         {"no_contact": {}},
         {"clearance": 1.0},
         {"estimator": {"horizontal_m": 2, "tilt_deg": 5}},
-        {"speed": {"max": 3}, "from": "never marked"},
+        {"speed": {"max": 3}, "from": "item 3"},
         {"at_end": {"is_armed": False, "is_landed": True, "near": [0, 0]}},
     ]
     return flown(checks=checks)
@@ -73,7 +73,7 @@ def test_what_is_so_passes(hop, name):
         ("exact modes", "takeoff ("),
         ("silent", "'Landed' at"),
         ("once", "never; nearest"),
-        ("speed", "'never marked' never came"),
+        ("speed", "'item 3' was never reached"),
     ],
 )
 def test_what_is_not_so_fails_and_says_why(hop, name, happened):
@@ -195,3 +195,27 @@ def test_a_check_of_nothing_measured_has_no_margin():
     assert not reached.passed
     assert isnan(reached.margin)
     assert corridor.happened == "it flew no mission"
+
+
+def test_an_exception_in_somebodys_python_is_an_error_of_the_flight(tmp_path):
+    file = tmp_path / "bad.py"
+    file.write_text("async def fly(drone):\n    await drone.wait_ready()\n    raise KeyError('x')\n")
+    result = run_scenario(Scenario.model_validate({"world": PLAIN, "vehicle": {"python": f"{file}:fly"}}))
+    assert result.error == f"{file}:fly, line 3: KeyError: 'x'"
+    file.write_text("import nothing_of_the_kind\n")
+    with pytest.raises(UserError, match="cannot be imported: ModuleNotFoundError"):
+        run_scenario(Scenario.model_validate({"world": PLAIN, "vehicle": {"python": f"{file}:fly"}}))
+
+
+def test_a_script_may_go_on_while_the_mission_is_flown():
+    path = {"points": [[0, 0, -8], [40, 0, -8]], "end": "hold", "waits": False}
+    script = [
+        {"fly_path": path},
+        {"wait_until": "north > 10"},
+        {"set_mode": "hold"},
+        {"mark": "held"},
+        {"wait": 3},
+        "land",
+    ]
+    result = flown(script, checks=[{"modes": ["mission", "hold", "land"]}, {"always": "north < 25"}])
+    assert result.passed, result.failures

@@ -79,6 +79,7 @@ def test_python_makes_the_same_scenario(tmp_path):
         ("about: Up and down.", "about: [", "not YAML"),
         ("vehicle:\n", "vehicle:\n  plan: a.plan\n", "2: vehicle: plan and script: choose one"),
         ("checks:", "faults: [{at: 1, when: speed > 1, battery: 0.1}]\nchecks:", "7: faults[0]: a fault has either at"),
+        ("- at_end", "- tilt: {max: 3}\n    from: upp\n  - at_end", "1: checks[0]: nothing makes a mark 'upp'"),
         ("- at_end", "- tilt: {max: 3}\n    speed: {max: 3}\n  - at_end", "names speed and tilt: put each in an entry"),
     ],
 )
