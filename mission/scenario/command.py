@@ -1,14 +1,18 @@
 """The command that flies scenario files and judges them: `honeyguide test`. Light to import."""
 
 import os
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from mission.console.command_refusal import learn_extra, refuse
 from mission.console.terminal import loading
+
+if TYPE_CHECKING:
+    from mission.scenario.scenario_file import ScenarioFile
 
 SEED_MAX = 2**31 - 1
 
@@ -41,7 +45,7 @@ def fly_scenarios(
         if not paths and not ready:
             raise UserError("test: name scenario files or folders, or add --ready")
         files = find_files([*(paths or ()), *([READY] if ready else [])])
-        scenarios = [ScenarioFile(path, read_scenario(path)) for path in files]
+        scenarios = _that_can_be_flown([ScenarioFile(path, read_scenario(path)) for path in files])
         chosen = None if seeds is None else _seeds(seeds)
         if junit is not None and not junit.resolve().parent.is_dir():
             raise UserError(f"--junit {junit}: no such folder")
@@ -61,6 +65,19 @@ def fly_scenarios(
     except UserError as error:
         refuse(str(error))
     raise typer.Exit(code)
+
+
+def _that_can_be_flown(files: list["ScenarioFile"]) -> list["ScenarioFile"]:
+    """All but those that ship and need the extra `learn`, where it is not installed: they are named."""
+    from mission.scenario.scenario_file import READY
+
+    if find_spec("torch") is not None:
+        return files
+    left_out = [file for file in files if file.path.parent == READY and file.scenario.needs_learn]
+    if left_out:
+        names = ", ".join(file.scenario.name for file in left_out)
+        typer.echo(f"left out, they need the extra 'learn' (docs/start/installing.md): {names}", err=True)
+    return [file for file in files if file not in left_out]
 
 
 def _seeds(text: str) -> tuple[int, ...]:

@@ -200,6 +200,11 @@ class Scenario(Part):
                     raise ValueError(f"checks[{number}]: nothing makes a mark '{end}'; {hint}")
 
     @property
+    def needs_learn(self) -> bool:
+        """Whether it needs the extra `learn`."""
+        return self.owner is not None or any(vehicle.policy is not None for vehicle in self.fleet)
+
+    @property
     def fleet(self) -> tuple[Vehicle, ...]:
         """Every vehicle, those of a count one by one."""
         return tuple(each for given in self.vehicles or (self.vehicle,) for each in [given] * given.count)

@@ -6,6 +6,7 @@ from typing import Any
 
 from mission.scenario.parts.conditions import QUANTITIES
 from mission.scenario.scenario import Scenario
+from mission.scenario.scenario_file import READY, find_files, read_scenario
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -28,9 +29,15 @@ def reference_text() -> str:
     tables = [_part(name, parts[name]) for name in order]
     rows = "\n".join(f"| `{name}` | {unit} | {meaning} |" for name, (unit, meaning) in QUANTITIES.items())
     quantities = f"## Quantities\n\nOf conditions.\n\n| name | unit | meaning |\n|---|---|---|\n{rows}\n"
-    return "\n".join([_HEADER, *tables, quantities])
+    shipped = [(path, read_scenario(path)) for path in find_files([READY])]
+    lines = "\n".join(
+        f"| [{scenario.name}]({_READY_URL}/{path.name}) | {scenario.about} |" for path, scenario in shipped
+    )
+    ready = f"## Those that ship\n\n| scenario | shows |\n|---|---|\n{lines}\n"
+    return "\n".join([_HEADER, *tables, quantities, ready])
 
 
+_READY_URL = "../../mission/scenario/ready"
 _HEADER = """# Keys of scenario files
 
 Written by `python -m docs.generate` from the models: do not edit. How they are used:

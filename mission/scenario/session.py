@@ -23,6 +23,9 @@ from mission.scenario.runner import run_scenario
 from mission.scenario.scenario import Scenario
 
 
+WIDTH = 150  # of the table where there is no terminal
+
+
 @dataclass(frozen=True, slots=True)
 class Planned:
     """One run of one scenario."""
@@ -65,6 +68,8 @@ def scenario_session(
 ) -> int:
     """Flies all, shows and writes the results; the exit code: 0 all passed, 1 some failed, 2 one cannot be flown."""
     console = Console()
+    if not console.is_terminal:
+        console = Console(width=WIDTH)
     try:
         flown = _flown(planned, min(jobs, len(planned)), console)
     except KeyboardInterrupt:
@@ -95,9 +100,12 @@ def _flown(planned: Sequence[Planned], jobs: int, console: Console) -> list[Flow
         def note(index: int, flown: Flown) -> None:
             done[index] = flown
             progress.advance(bar)
-            if flown.result is None or not flown.result.passed:
-                name = planned[index].scenario.name
-                progress.console.print(f"{name}, seed {planned[index].seed}: failed", markup=False, highlight=False)
+            is_passed = flown.result is not None and flown.result.passed
+            if not is_passed or not console.is_terminal:
+                text = (
+                    f"{planned[index].scenario.name}, seed {planned[index].seed}: {'passed' if is_passed else 'failed'}"
+                )
+                print_line(progress.console, f"{len(done)}/{len(planned)} {text}")
 
         if jobs <= 1:
             for index, each in enumerate(planned):

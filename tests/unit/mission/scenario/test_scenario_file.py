@@ -3,6 +3,7 @@
 from typing import get_args
 
 import pytest
+import yaml
 
 from autopilot.interface.vehicle_state import Mode
 from mission.console.option_checks import UserError
@@ -118,6 +119,8 @@ def test_scenarios_that_ship_say_what_they_show_and_ask_something(path):
     assert scenario.about.endswith(".")
     assert scenario.checks
     assert flight_configs(scenario, 1)
+    dumped = yaml.safe_dump(scenario.model_dump(mode="json", by_alias=True, exclude_unset=True))
+    assert parse_scenario(dumped, path.name, path.parent) == scenario
 
 
 def test_a_world_has_what_the_world_module_offers():
