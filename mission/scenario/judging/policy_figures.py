@@ -41,7 +41,7 @@ def following_figures(track: Track, asked: Following) -> Iterator[CheckResult]:
 
 
 def scorecard_figures(track: Track, asked: Mapping[str, Range]) -> Iterator[CheckResult]:
-    """A result for each bound of each figure; a figure that there is nothing for, as losses of who lost nobody, fails."""
+    """A result for each bound of each figure; one that there is nothing for fails."""
     card = scorecard([track])
     for name, bounds in asked.items():
         value = getattr(card, name).value

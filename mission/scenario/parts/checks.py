@@ -204,8 +204,8 @@ class Following(Part):
 
 
 FigureName = Literal[
-    "success", "tracking", "collision", "in_band", "distance_rmse_m", "distance_median_m", "bearing_error_deg", "in_view",
-    "losses_per_minute", "loss_s", "reacquired",
+    "success", "tracking", "collision", "in_band", "distance_rmse_m", "distance_median_m", "bearing_error_deg",
+    "in_view", "losses_per_minute", "loss_s", "reacquired",
 ]  # fmt: skip
 
 
