@@ -18,6 +18,11 @@ def wall_time_s() -> float:
     return time.perf_counter()
 
 
+def process_time_s() -> float:
+    """Processor time that this process has taken."""
+    return time.process_time()
+
+
 def wall_sleep_s(seconds: float) -> None:
     """Lets the wall clock run on, while simulated time stands still."""
     time.sleep(seconds)

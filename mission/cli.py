@@ -18,6 +18,7 @@ from mission.console.terminal import loading
 from mission.follow import follow_commands
 from mission.park import park_command
 from mission.review import review_command
+from mission.scenario import command as scenario_command
 from mission.train import task_commands, training_commands
 from mission.view import replay_command
 from mission.world import world_command
@@ -150,6 +151,7 @@ app.command(cls=LateCommand)(park_command.park)
 app.command()(replay_command.replay)
 app.command()(world_command.world)
 app.command()(review_command.review)
+app.command(name="test")(scenario_command.fly_scenarios)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)
 app.command(name="eval")(training_commands.evaluate)
 app.command()(training_commands.export)

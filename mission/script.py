@@ -331,6 +331,21 @@ class Drone(Client):
         return GeoPoint(lat_deg, lon_deg, home.alt_m + message.z)
 
 
+async def start_plan(drone: Drone, plan: Plan) -> None:
+    """Uploads a plan, with fence and rally points if it has any, and starts it.
+
+    Raises:
+        ScriptError: the vehicle refused it.
+    """
+    await drone.wait_ready()
+    if plan.fence:
+        await drone.upload(fence_items(plan), FENCE_LIST)
+    if plan.rally:
+        await drone.upload(rally_items(plan), RALLY_LIST)
+    await drone.upload(plan.items)
+    await drone.start_mission()
+
+
 async def fly_plan(drone: Drone, plan: Plan) -> None:
     """Uploads a plan, with fence and rally points if it has any, and flies it.
 
@@ -339,14 +354,8 @@ async def fly_plan(drone: Drone, plan: Plan) -> None:
     Raises:
         ScriptError: the vehicle refused it, or did something else in the end.
     """
-    await drone.wait_ready()
-    if plan.fence:
-        await drone.upload(fence_items(plan), FENCE_LIST)
-    if plan.rally:
-        await drone.upload(rally_items(plan), RALLY_LIST)
-    await drone.upload(plan.items)
     first_text = len(drone.texts)
-    await drone.start_mission()
+    await start_plan(drone, plan)
     last = plan.items[-1]
     if last.command in (CMD_LAND, CMD_RETURN_TO_LAUNCH):
         await drone.wait_disarmed(timeout_s=3600.0)
@@ -376,4 +385,4 @@ async def set_out(drone: Drone) -> None:
 
 Script = Callable[[Drone], Coroutine[Any, Any, Any]]
 
-__all__ = ["Drone", "Script", "ScriptError", "ScriptTimeout", "fly_plan", "set_out", "take_off"]
+__all__ = ["Drone", "Script", "ScriptError", "ScriptTimeout", "fly_plan", "set_out", "start_plan", "take_off"]

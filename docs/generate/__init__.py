@@ -14,6 +14,7 @@ from docs.generate.tasks_page import tasks_text
 from docs.generate.training_page import training_text
 from docs.generate.world_page import world_text
 from mission.flight import Flight, FlightConfig
+from mission.scenario.schema import reference_text, schema_text
 from mission.simulator.simulator_params import simulator_parameters
 from sim.bodies.vehicles import class_of
 
@@ -106,6 +107,8 @@ def generated_pages() -> dict[Path, str]:
         REFERENCE / "training-config.md": training_text(),
         REFERENCE / "tasks.md": tasks_text(),
         REFERENCE / "world-file.md": world_text(),
+        REFERENCE / "scenario-keys.md": reference_text(),
+        REFERENCE / "scenario.schema.json": schema_text(),
     }
 
 

@@ -39,8 +39,8 @@ def check_task(name: str) -> None:
 
 def check_recipe(name: str) -> None:
     """Refuses what is neither a configuration file nor a recipe."""
+    from common.config.yaml_locations import ConfigError
     from policies.learn.config.recipes import recipe
-    from policies.learn.config.yaml_locations import ConfigError
     from policies.tasks.catalogue import is_task_name
 
     try:

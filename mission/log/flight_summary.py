@@ -77,7 +77,7 @@ def estimator_errors(history: History, frames: Rows) -> EstimatorErrors:
         return EstimatorErrors((nan, nan, nan), (nan, nan, nan), nan, nan)
     pos = history.pos_ned_est[frames].astype(float) - history.pos_ned_true[frames]
     vel = history.vel_ned_est[frames].astype(float) - history.vel_ned_true[frames]
-    error_ned = _rotation_error_ned(history.q_est[frames].astype(float), history.q_true[frames].astype(float))
+    error_ned = rotation_error_ned(history.q_est[frames].astype(float), history.q_true[frames].astype(float))
     return EstimatorErrors(
         tuple(_rms(pos)),
         tuple(_rms(vel)),
@@ -141,7 +141,7 @@ def _rms(errors: Rows) -> Any:
     return np.sqrt(np.mean(np.square(errors), axis=0))
 
 
-def _rotation_error_ned(q_est: Rows, q_true: Rows) -> Rows:
+def rotation_error_ned(q_est: Rows, q_true: Rows) -> Rows:
     """Rotation vectors [rad] in ned that turn the true attitude into the estimated one; (x, y, z, w) rows."""
     ex, ey, ez, ew = q_est.T
     tx, ty, tz, tw = (-q_true[:, 0], -q_true[:, 1], -q_true[:, 2], q_true[:, 3])

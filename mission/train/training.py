@@ -12,6 +12,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
 
 from common.clock import wall_time_s
+from common.config.yaml_locations import ConfigError
 from common.files import write_to_nowhere
 from mission.console.terminal import LINE_PERIOD_S, busy, print_line
 from policies.learn.algorithms.sac import SacError
@@ -20,7 +21,6 @@ from policies.learn.config.load import Loaded, load_config
 from policies.learn.config.recipes import recipe
 from policies.learn.config.run import RunConfig
 from policies.learn.config.task_check import check_against_task
-from policies.learn.config.yaml_locations import ConfigError
 from policies.learn.evaluate import Evaluation, evaluate
 from policies.learn.export.onnx_export import ExportError, export_policy
 from policies.learn.export.policy_file import load_policy

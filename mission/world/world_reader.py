@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
+from common.config.refusal import sentence
+from common.config.yaml_locations import ConfigError, Located, location_at, note_at, read_yaml
 from mission.console.option_checks import UserError
-from policies.learn.config.refusal import sentence
-from policies.learn.config.yaml_locations import ConfigError, Located, location_at, note_at, read_yaml
 
 if TYPE_CHECKING:
     from sim.world.custom.world_file import WorldFile

@@ -46,6 +46,7 @@ RUN_BY_OTHERS = (
     f"{HONEYGUIDE} replay ",  # tests/unit/mission/view/test_replay.py
     f"{HONEYGUIDE} review ",  # tests/unit/mission/review/test_review_session.py
     f"{HONEYGUIDE} benchmark ",  # tests/unit/mission/follow/test_benchmark.py
+    f"{HONEYGUIDE} test ",  # tests/unit/mission/scenario/test_command.py, tests/system/scenarios
     f"{HONEYGUIDE} companion ",  # tests/system/companion/test_companion.py
     *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export")),  # tests/unit/mission/train
 )
@@ -251,6 +252,7 @@ SECTIONS_OF_COMMANDS = {  # the page, and the heading under which its options ar
     "review": ("docs/how-to/review.md", "Reviewing a flight"),
     "companion": ("docs/how-to/companion.md", "The companion computer"),
     "park": ("docs/how-to/rover.md", "Park it"),
+    "test": ("docs/how-to/scenarios.md", "Missions as tests"),
     "play": ("docs/how-to/demonstrations.md", "Watch"),
     "drive": ("docs/how-to/demonstrations.md", "Drive"),
     "demonstrate": ("docs/how-to/demonstrations.md", "Record"),

@@ -9,11 +9,11 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from common.config.refusal import sentence
+from common.config.yaml_locations import ConfigError
 from policies.learn.config.environment import Curriculum, EnvironmentParameter
 from policies.learn.config.load import Loaded
-from policies.learn.config.refusal import sentence
 from policies.learn.config.run import RunConfig
-from policies.learn.config.yaml_locations import ConfigError
 
 _Block = TypeVar("_Block", bound=BaseModel)
 

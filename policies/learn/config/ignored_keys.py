@@ -10,13 +10,13 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from common.config.refusal import unknown_key
+from common.config.yaml_locations import Located, note_at
 from policies.learn.config.behavior import BehavioralCloning
 from policies.learn.config.environment import CompletionCriteria
 from policies.learn.config.network import Memory, NetworkSettings
 from policies.learn.config.old_form import MEMORY_KEYS, wants_memory
-from policies.learn.config.refusal import unknown_key
 from policies.learn.config.run import TorchSettings
-from policies.learn.config.yaml_locations import Located, note_at
 
 _ENCODED = ("gail", "curiosity", "rnd")
 _HOW_TO_ASK = ": a memory is asked for by memory: {sequence_length, memory_size}"

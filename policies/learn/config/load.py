@@ -11,11 +11,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from policies.learn.config.ignored_keys import put_right
-from policies.learn.config.old_form import behavior_from_flat, flat_names, is_flat, parameters_from_old
-from policies.learn.config.refusal import sentence, unknown_key
-from policies.learn.config.run import RunConfig
-from policies.learn.config.yaml_locations import (
+from common.config.refusal import sentence, unknown_key
+from common.config.yaml_locations import (
     ConfigError,
     Located,
     Location,
@@ -25,6 +22,9 @@ from policies.learn.config.yaml_locations import (
     merged,
     read_yaml,
 )
+from policies.learn.config.ignored_keys import put_right
+from policies.learn.config.old_form import behavior_from_flat, flat_names, is_flat, parameters_from_old
+from policies.learn.config.run import RunConfig
 
 _TOP_KEYS = (*(set(RunConfig.model_fields) - {"behavior", "behavior_name"}), "behaviors", "default_settings")
 _MIDDLE_KEYS = ("curriculum", "parameter_randomization")

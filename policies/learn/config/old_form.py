@@ -6,9 +6,9 @@ middle form has `behaviors`, with `curriculum` and `parameter_randomization` bes
 
 from typing import Any
 
+from common.config.refusal import shown, unknown_key
+from common.config.yaml_locations import Located, Location, error_at, mapping_at, merged, note_at
 from policies.learn.config.behavior import HYPERPARAMETERS
-from policies.learn.config.refusal import shown, unknown_key
-from policies.learn.config.yaml_locations import Located, Location, error_at, mapping_at, merged, note_at
 
 MEMORY_KEYS = ("use_recurrent", "sequence_length", "memory_size")
 _NETWORK_KEYS = "num_layers hidden_units normalize vis_encode_type".split()

@@ -3,7 +3,7 @@
 from importlib.resources import files
 from pathlib import Path
 
-from policies.learn.config.yaml_locations import ConfigError
+from common.config.yaml_locations import ConfigError
 from policies.tasks.catalogue import file_stem
 
 

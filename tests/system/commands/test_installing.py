@@ -16,6 +16,8 @@ PIP = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
 OF_EXTRAS = (
     *("policies.", "mission.view.", "mission.train.", "mission.follow.", "mission.park.park_session"),
     "mission.benchmark.",
+    *("mission.scenario.flight.companions", "mission.scenario.flight.policy_steps"),
+    "mission.scenario.judging.policy_figures",
     *("sim.engines.bullet", "sim.engines.jsbsim_", "sim.engines.quiet_"),
     *("autopilot.tuning", "autopilot.control.margins", "autopilot.estimator.derive"),
     *("autopilot.vehicles.multirotor.tuning", "autopilot.vehicles.rover.tuning"),
@@ -59,6 +61,10 @@ def test_a_bare_environment_flies_and_imports_all_but_what_extras_bring(tmp_path
     assert flight.returncode == 1, flight.stderr  # it ended before its mission
     assert "mission not finished" in flight.stdout
     assert (tmp_path / "flight" / "flight.ulg").stat().st_size > 100_000
+    (tmp_path / "hop.scenario.yaml").write_text("vehicle: {script: [arm, {takeoff: 5}, land]}\n")
+    tested = run(python.with_name("honeyguide"), "test", "hop.scenario.yaml")
+    assert tested.returncode == 0, tested.stderr
+    assert "1 of 1 passed" in tested.stdout
     refused = run(python.with_name("honeyguide"), "fly", "--engine", "pybullet")
     assert refused.returncode == 2, refused.stderr
     assert "the extra 'engines'" in refused.stderr

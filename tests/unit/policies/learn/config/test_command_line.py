@@ -1,12 +1,12 @@
 import pytest
 
+from common.config.yaml_locations import ConfigError
 from policies.learn.config.behavior import Behavior
 from policies.learn.config.command_line import CommandLine, flags, with_command_line
 from policies.learn.config.environment import CompletionCriteria, Curriculum, EnvSettings, Lesson
 from policies.learn.config.load import Loaded
 from policies.learn.config.network import NetworkSettings
 from policies.learn.config.run import CheckpointSettings, RunConfig, TorchSettings
-from policies.learn.config.yaml_locations import ConfigError
 
 FILE = RunConfig(
     behavior_name="Car",

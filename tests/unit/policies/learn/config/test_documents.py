@@ -2,12 +2,12 @@ from pathlib import Path
 
 import pytest
 
+from common.config.yaml_locations import ConfigError
 from policies.learn.config.behavior import Behavior, PpoHyperparameters, SacHyperparameters
 from policies.learn.config.load import load_config
 from policies.learn.config.network import Memory, NetworkSettings
 from policies.learn.config.run import RunConfig
 from policies.learn.config.signals import ExtrinsicSettings, GailSettings, RewardSignals
-from policies.learn.config.yaml_locations import ConfigError
 
 DATA = Path(__file__).parent / "data"
 

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.config.yaml_locations import ConfigError, parse_yaml
 from policies.learn.config.behavior import Behavior
 from policies.learn.config.load import load_config
 from policies.learn.config.signals import CuriositySettings, ExtrinsicSettings
-from policies.learn.config.yaml_locations import ConfigError, parse_yaml
 
 CAR = """\
 behaviors:

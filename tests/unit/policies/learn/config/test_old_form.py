@@ -1,5 +1,6 @@
 import pytest
 
+from common.config.yaml_locations import ConfigError
 from policies.learn.config.environment import (
     CompletionCriteria,
     Curriculum,
@@ -13,7 +14,6 @@ from policies.learn.config.environment import (
 )
 from policies.learn.config.load import load_config
 from policies.learn.config.network import Memory
-from policies.learn.config.yaml_locations import ConfigError
 
 FLAT = """\
 default:

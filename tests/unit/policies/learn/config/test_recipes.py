@@ -1,8 +1,8 @@
 import pytest
 
+from common.config.yaml_locations import ConfigError
 from policies.learn.config.load import load_config
 from policies.learn.config.recipes import recipe, recipe_names
-from policies.learn.config.yaml_locations import ConfigError
 from policies.tasks.catalogue import CATALOGUE, task_settings
 
 FOR_ANY = {"gym", "gym-sac", "own"}  # task, that the command names

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from policies.learn.config.refusal import shown
+from common.config.refusal import shown
 
 MAX_NODES = 100_000  # aliases of aliases grow without bound
 

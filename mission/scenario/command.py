@@ -1,0 +1,92 @@
+"""The command that flies scenario files and judges them: `honeyguide test`. Light to import."""
+
+import os
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from mission.console.command_refusal import learn_extra, refuse
+from mission.console.terminal import loading
+
+if TYPE_CHECKING:
+    from mission.scenario.scenario_file import ScenarioFile
+
+SEED_MAX = 2**31 - 1
+
+
+def fly_scenarios(
+    paths: Annotated[
+        list[Path] | None, typer.Argument(help="Scenario files, or folders of *.scenario.yaml.", show_default=False)
+    ] = None,
+    ready: Annotated[bool, typer.Option("--ready", help="Those that ship, too.")] = False,
+    seeds: Annotated[
+        str | None, typer.Option(help="Fly each with these, as 1,2,3. Default: those of the scenario.")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes at a time. Default: one per core.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML.")] = None,
+    keep: Annotated[Path | None, typer.Option(help="Folder where runs that fail are kept, with logs.")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show what failed only.")] = False,
+    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON schema of scenario files, and end.")] = False,
+) -> None:
+    """Fly scenarios faster than real time and check what is asked of them: 0 passed, 1 failed, 2 wrong input."""
+    from mission.console.option_checks import UserError
+
+    if schema:
+        from mission.scenario.schema import schema_text
+
+        typer.echo(schema_text(), nl=False)
+        return
+    try:
+        from mission.scenario.scenario_file import READY, ScenarioFile, find_files, read_scenario
+
+        if not paths and not ready:
+            raise UserError("test: name scenario files or folders, or add --ready")
+        files = find_files([*(paths or ()), *([READY] if ready else [])])
+        scenarios = _that_can_be_flown([ScenarioFile(path, read_scenario(path)) for path in files])
+        chosen = None if seeds is None else _seeds(seeds)
+        if junit is not None and not junit.resolve().parent.is_dir():
+            raise UserError(f"--junit {junit}: no such folder")
+        with learn_extra():
+            with loading(Console(stderr=True)):
+                from mission.scenario.flight.building import check_scenario
+                from mission.scenario.session import Planned, scenario_session
+
+                for file in scenarios:
+                    check_scenario(file.scenario, str(file.path))
+            planned = [
+                Planned(file.scenario, str(file.path), seed, keep)
+                for file in scenarios
+                for seed in chosen or file.scenario.seeds
+            ]
+            code = scenario_session(planned, jobs or len(os.sched_getaffinity(0)), junit=junit, is_quiet=quiet)
+    except UserError as error:
+        refuse(str(error))
+    raise typer.Exit(code)
+
+
+def _that_can_be_flown(files: list["ScenarioFile"]) -> list["ScenarioFile"]:
+    """All but those that ship and need the extra `learn`, where it is not installed: they are named."""
+    from mission.scenario.scenario_file import READY
+
+    if find_spec("torch") is not None:
+        return files
+    left_out = [file for file in files if file.path.parent == READY and file.scenario.needs_learn]
+    if left_out:
+        names = ", ".join(file.scenario.name for file in left_out)
+        typer.echo(f"left out, they need the extra 'learn' (docs/start/installing.md): {names}", err=True)
+    return [file for file in files if file not in left_out]
+
+
+def _seeds(text: str) -> tuple[int, ...]:
+    from mission.console.option_checks import UserError
+
+    try:
+        seeds = tuple(int(part) for part in text.split(","))
+    except ValueError:
+        seeds = (-1,)
+    if not all(0 <= seed <= SEED_MAX for seed in seeds):
+        raise UserError(f"--seeds {text}: must be whole numbers from 0, as 1,2,3")
+    return seeds

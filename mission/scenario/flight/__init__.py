@@ -1,0 +1,1 @@
+"""A scenario in flight: built, told what to do, broken on time."""

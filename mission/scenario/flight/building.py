@@ -1,0 +1,220 @@
+"""Flights made from a scenario: their configurations, the world, links, and the companion that a policy flies.
+
+In: a checked scenario and a seed. Out: vehicles that have not begun, each with who watches it.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from autopilot.mavlink.client_end import GROUND_STATION, ClientEnd
+from autopilot.mavlink.transport.links import Link, LinkRole, memory_pair
+from common.airframe import AirframeError, load_airframe
+from common.geodesy import DEFAULT_HOME, GeoPoint
+from common.params import ParameterError
+from mission.console.option_checks import UserError
+from mission.fleet.fleet_flight import FleetFlight
+from mission.fleet.fleet_options import Member
+from mission.fleet.roster import fleet_configs
+from mission.flight import Flight
+from mission.flight_config import AIRFIELD, TREELESS_M, FlightConfig, OwnerConfig, flight_parameters
+from mission.plan.plan_file import PlanError, read_plan
+from mission.scenario.scenario import Scenario, Vehicle, World
+from mission.simulator.flight_rig import flight_world
+from sim.bodies.vehicles import class_of
+from sim.world.driving_worlds import CAR_PARK, COURSE
+from sim.world.forest_world import FOREST, WALLED_FOREST
+from sim.world.world import WorldConfig
+
+KINDS = {
+    "hills": WorldConfig(treeless_radius_m=TREELESS_M),
+    "plain": WorldConfig(hill_height_m=0.0, trees_per_ha=0.0),
+    "airfield": AIRFIELD,
+    "forest": FOREST.model_copy(update={"trees_per_ha": 400.0}),
+    "walled-forest": WALLED_FOREST,
+    "course": COURSE,
+    "car-park": CAR_PARK,
+}
+FORESTS = ("forest", "walled-forest")
+STATION_SYSTEM, STATION_COMPONENT = 255, 190  # as QGroundControl's
+
+
+class GroundStation:
+    """A ground station that is connected, and can be cut off; a computer of the flight."""
+
+    def __init__(self) -> None:
+        self.vehicle_end, self._link = memory_pair(LinkRole.GROUND)
+        self._client = ClientEnd(self._link, STATION_SYSTEM, STATION_COMPONENT, mav_type=GROUND_STATION)
+        self.is_cut = False
+
+    def frame(self, time_us: int) -> None:
+        """Hears the vehicle, and sends its heartbeat."""
+        self._link.receive()
+        if not self.is_cut:
+            self._client.keep_alive(time_us)
+
+
+def _kind(name: str) -> WorldConfig:
+    """The world that a kind stands for."""
+    if name == "follow":
+        from policies.tasks.follow_me.world import FOLLOW_WORLD
+
+        return FOLLOW_WORLD
+    return KINDS[name]
+
+
+def world_config(world: World) -> WorldConfig:
+    """The ground as the world module has it.
+
+    Raises:
+        UserError: it cannot be made so.
+    """
+    if world.file is not None:
+        raise UserError("world.file: world files cannot be flown yet")
+    given = {k: v for k, v in world.model_dump(exclude={"kind", "file"}).items() if v is not None}
+    try:
+        return WorldConfig(**{**_kind(world.kind).model_dump(), **given})
+    except ValueError as error:
+        raise UserError(f"world: {error}") from error
+
+
+def flight_configs(scenario: Scenario, seed: int) -> list[FlightConfig]:
+    """The configuration of each vehicle, with its parameters checked.
+
+    Raises:
+        UserError: an airframe, a parameter or the world is wrong.
+    """
+    fleet = scenario.fleet
+    home = DEFAULT_HOME if scenario.home is None else GeoPoint(*scenario.home.model_dump().values())
+    base = FlightConfig(
+        seed=seed,
+        wind_m_s=scenario.wind.speed_m_s,
+        wind_from_deg=scenario.wind.from_deg,
+        noise=scenario.noise,
+        engine=scenario.engine,
+        traffic_count=scenario.traffic,
+        home=home,
+        world=world_config(scenario.world),
+        owner=None if scenario.owner is None else OwnerConfig(**scenario.owner.model_dump()),
+    )
+    try:
+        own = [_own(base, scenario, vehicle) for vehicle in fleet]
+        for config in own:
+            flight_parameters(config, load_airframe(config.airframe))
+        return own if len(own) == 1 else _placed(base, scenario, own)
+    except (AirframeError, ParameterError) as error:
+        raise UserError(str(error)) from error
+
+
+def check_scenario(scenario: Scenario, file: str) -> None:
+    """Refuses what can be seen to be wrong before anything is flown.
+
+    Raises:
+        UserError: an airframe, parameter, plan, policy or function is not there.
+    """
+    try:
+        flight_configs(scenario, scenario.seeds[0])
+        for vehicle in scenario.fleet:
+            for plan in [vehicle.plan, *(step.fly_plan.file for step in vehicle.script if step.fly_plan)]:
+                if plan is not None:
+                    read_plan(plan)
+            if vehicle.python is not None and not Path(vehicle.python.rpartition(":")[0]).is_file():
+                raise UserError(f"{vehicle.python}: no such file")
+            if vehicle.policy is not None:
+                from mission.scenario.flight.companions import check_policy
+
+                check_policy(vehicle.policy)
+    except (UserError, PlanError) as error:
+        raise UserError(f"{file}: {error}") from error
+
+
+def _own(base: FlightConfig, scenario: Scenario, vehicle: Vehicle) -> FlightConfig:
+    drives = class_of(load_airframe(vehicle.airframe)).drives
+    follows_on_wheels = scenario.owner is not None and drives
+    return base.model_copy(
+        update={
+            "airframe": vehicle.airframe,
+            "throw_m_s": vehicle.throw_m_s,
+            "has_lidar": vehicle.has_lidar,
+            "has_base": vehicle.has_base,
+            "start_ne_m": vehicle.start.ne_m,
+            "parameters": dict(vehicle.parameters),
+            "is_forest": vehicle.policy is not None and (scenario.world.kind in FORESTS or follows_on_wheels),
+            "scan_lag_s": 0.0 if vehicle.policy is None else vehicle.policy.scan_lag_s,
+        }
+    )
+
+
+def _placed(base: FlightConfig, scenario: Scenario, own: list[FlightConfig]) -> list[FlightConfig]:
+    """Side by side where they have no place of their own, each with its number and seed."""
+    members = [Member(config.airframe, "own") for config in own]
+    placed = fleet_configs(base, members, flight_world(base))
+    fleet = []
+    for config, mine, vehicle in zip(placed, own, scenario.fleet, strict=True):
+        has_place = (
+            vehicle.count == 1 and "start" in vehicle.model_fields_set and "ne_m" in vehicle.start.model_fields_set
+        )
+        fleet.append(
+            mine.model_copy(
+                update={
+                    "seed": config.seed,
+                    "start_ne_m": mine.start_ne_m if has_place else config.start_ne_m,
+                    "parameters": {**mine.parameters, **config.parameters},
+                }
+            )
+        )
+    return fleet
+
+
+class Built:
+    """The flights of a scenario, before their first frame.
+
+    Args:
+        scenario: what is flown.
+        seed: of noise, turbulence and the owner's path.
+        folder: where logs go; None writes none.
+
+    Raises:
+        UserError: it cannot be built.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int, folder: Path | None) -> None:
+        configs = flight_configs(scenario, seed)
+        self.stations = [GroundStation() for _ in configs] if scenario.has_ground_station else []
+        links: list[Sequence[Link]] = [(station.vehicle_end,) for station in self.stations] or [()] * len(configs)
+        self.companion: Any = None
+        self.fleet: FleetFlight | None = None
+        if len(configs) > 1:
+            world = flight_world(configs[0])
+            self.fleet = FleetFlight(
+                configs, world, links=links, folder=folder, has_transponders=scenario.has_transponders
+            )
+            self.flights: list[Any] = list(self.fleet.flights)
+        else:
+            self.flights = [self._alone(scenario, configs[0], links[0], folder)]
+        for i, (flight, vehicle) in enumerate(zip(self.flights, scenario.fleet, strict=True)):
+            if self.stations:
+                flight.computers.append(self.stations[i])
+            if scenario.wind.turbulence_m_s is not None:
+                flight.set_air(scenario.wind.speed_m_s, scenario.wind.from_deg, scenario.wind.turbulence_m_s)
+            set_charge(flight, vehicle.start.battery)
+
+    def _alone(self, scenario: Scenario, config: FlightConfig, links: Sequence[Link], folder: Path | None) -> Any:
+        policy = scenario.fleet[0].policy
+        if policy is None:
+            return Flight(config, links=links, folder=folder)
+        from mission.scenario.flight.companions import flight_with_policy
+
+        flight, self.companion = flight_with_policy(config, policy, links, folder)
+        return flight
+
+    def close(self) -> list[Any]:
+        """Completes the logs; the history of each."""
+        return self.fleet.close() if self.fleet is not None else [self.flights[0].close()]
+
+
+def set_charge(flight: Any, remaining: float) -> None:
+    """Gives the battery so much of its charge, if it has less than all of it."""
+    body = flight.rig.rows["body"]
+    if remaining < 1.0 and "battery_charge_c" in body.dtype.names:
+        body["battery_charge_c"][0] = remaining * 3.6 * flight.airframe.battery.capacity_mah

@@ -1,0 +1,1 @@
+"""A scenario after its flight: judged by its checks."""

@@ -1,0 +1,1 @@
+"""What a scenario is written with: steps, faults, checks, conditions. Light to import."""

@@ -1,0 +1,127 @@
+"""Scenario files: found, read, checked; each fault is one sentence with file, line and key. Light to import."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from common.config.refusal import NO_SUCH_KEY, keys_beside, sentence
+from common.config.yaml_locations import ConfigError, Located, location_at, parse_yaml
+from mission.console.option_checks import UserError
+from mission.scenario.scenario import Scenario
+
+SUFFIX = ".scenario.yaml"
+READY = Path(__file__).parent / "ready"
+"""The scenarios that ship."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioFile:
+    """A scenario and where it came from."""
+
+    path: Path
+    scenario: Scenario
+
+
+def find_files(paths: Iterable[Path]) -> list[Path]:
+    """The scenario files of files and folders, in order, each once.
+
+    Raises:
+        UserError: there is no such path, or a folder without any.
+    """
+    found: dict[Path, None] = {}
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(path.rglob(f"*{SUFFIX}"))
+            if not inside:
+                raise UserError(f"{path}: holds no *{SUFFIX}")
+            found.update(dict.fromkeys(inside))
+        elif path.is_file():
+            found[path] = None
+        else:
+            raise UserError(f"{path}: no such file or folder")
+    return list(found)
+
+
+def read_scenario(path: Path | str) -> Scenario:
+    """The scenario of a file; paths in it, which are seen from its folder, are made absolute.
+
+    Raises:
+        UserError: it cannot be read, or says something that is wrong.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise UserError(f"{path}: is not UTF-8 text") from None
+    except OSError as error:
+        raise UserError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+    return parse_scenario(text, str(path), path.parent)
+
+
+def parse_scenario(text: str, file: str, folder: Path) -> Scenario:
+    """The scenario of a text.
+
+    Args:
+        text: YAML.
+        file: what faults call it.
+        folder: that paths in it are seen from.
+
+    Raises:
+        UserError: it says something that is wrong.
+    """
+    notes: list[str] = []
+    try:
+        root = parse_yaml(text, file, notes)
+    except ConfigError as error:
+        raise UserError(str(error)) from error
+    if notes:
+        raise UserError(notes[0])
+    if not root.get("name"):
+        root.put("name", Path(file).name.removesuffix(SUFFIX))
+    _resolve(root, folder.resolve())
+    try:
+        return Scenario.model_validate(root)
+    except ValidationError as error:
+        raise UserError(_fault(error, root)) from error
+
+
+def _fault(error: ValidationError, root: Located) -> str:
+    """The first fault as a sentence with its place."""
+    first = min(error.errors(), key=lambda each: location_at(root, each["loc"])[0].line)
+    location, key = location_at(root, first["loc"])
+    text = sentence(first, Scenario)
+    if text == NO_SUCH_KEY:
+        text += f"; there are {', '.join(keys_beside(Scenario, first['loc']))}"
+    return f"{location}: {key}: {text}" if key else f"{location}: {text}"
+
+
+def _resolve(root: Located, folder: Path) -> None:
+    """Makes paths absolute, as far as the file has the form that it should."""
+    for vehicle in [root.get("vehicle"), *_mappings(root.get("vehicles"))]:
+        if isinstance(vehicle, dict):
+            for key in ("plan", "python"):
+                _absolute(vehicle, key, folder)
+            airframe = vehicle.get("airframe")
+            if isinstance(airframe, str) and airframe.endswith(".toml"):
+                _absolute(vehicle, "airframe", folder)
+            for step in _mappings(vehicle.get("script")):
+                given = step.get("fly_plan")
+                _absolute(
+                    given if isinstance(given, dict) else step,
+                    "file" if isinstance(given, dict) else "fly_plan",
+                    folder,
+                )
+    if isinstance(root.get("world"), dict):
+        _absolute(root["world"], "file", folder)
+
+
+def _mappings(value: Any) -> list[dict[str, Any]]:
+    return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
+
+
+def _absolute(mapping: dict[str, Any], key: str, folder: Path) -> None:
+    if isinstance(mapping.get(key), str):
+        mapping[key] = str(folder / mapping[key])
