@@ -21,6 +21,7 @@ from mission.flight_config import AIRFIELD, TREELESS_M, FlightConfig, OwnerConfi
 from mission.plan.plan_file import PlanError, read_plan
 from mission.scenario.scenario import Scenario, Vehicle, World
 from mission.simulator.flight_rig import flight_world
+from mission.world.world_reader import read_world
 from sim.bodies.vehicles import class_of
 from sim.world.driving_worlds import CAR_PARK, COURSE
 from sim.world.forest_world import FOREST, WALLED_FOREST
@@ -70,7 +71,7 @@ def world_config(world: World) -> WorldConfig:
         UserError: it cannot be made so.
     """
     if world.file is not None:
-        raise UserError("world.file: world files cannot be flown yet")
+        return read_world(world.file)
     given = {k: v for k, v in world.model_dump(exclude={"kind", "file"}).items() if v is not None}
     try:
         return WorldConfig(**{**_kind(world.kind).model_dump(), **given})
