@@ -8,7 +8,7 @@ import yaml
 
 from autopilot.interface.vehicle_state import Mode
 from mission.console.option_checks import UserError
-from mission.flight_settings import WorldKind
+from mission.flight_settings import WORLD_KINDS
 from mission.scenario.flight.building import flight_configs
 from mission.scenario.flight.flying import ACTIONS
 from mission.scenario.judging.judge import JUDGES
@@ -143,7 +143,7 @@ def test_names_are_those_of_the_parts_that_do_it():
     assert set(Step.names()) == ACTIONS.keys()
     assert set(Check.names()) == JUDGES.keys()
     assert set(get_args(FigureName)) == {each.name for each in fields(Scorecard) if each.type is Interval}
-    assert set(get_args(WorldKind)) < set(get_args(WorldName))
+    assert set(WORLD_KINDS) < set(get_args(WorldName))
 
 
 def test_a_wrong_parameter_is_refused_before_anything_flies():
