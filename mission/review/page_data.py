@@ -13,7 +13,7 @@ from mission.review.panels.motion import TRUE
 from mission.review.timeline import Span
 from mission.review.vibration import Spectrum
 from mission.view import shapes
-from mission.view.page_arrays import Json, mesh_data
+from mission.view.web.page_arrays import Json, mesh_data
 
 PLAIN_AIRFRAME = "x500"  # drawn for vehicles of others
 DB_RANGE = (2.0, 99.8)  # percentiles of a waterfall between which its colours lie

@@ -14,7 +14,7 @@ SCRIPTS = ("core.js", "time_plot.js", "track_map.js", "scene.js", "spectrum.js",
 def review_page(reviews: Sequence[FlightReview], title: str) -> bytes:
     """The file of one flight, or of several laid over each other."""
     data = json.dumps(page_data(reviews, title), separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
-    scripts = [files("mission.view").joinpath("webgl.js").read_text(encoding="utf-8")]
+    scripts = [files("mission.view.web").joinpath("webgl.js").read_text(encoding="utf-8")]
     scripts += [page_part(name) for name in SCRIPTS]
     page = page_part("review.html")
     for mark, text in (

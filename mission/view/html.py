@@ -1,6 +1,6 @@
 """A recorded flight as one HTML file that needs nothing else: no network, no server, no library.
 
-In: a recording and its world. Out: the page `replay.html` of this folder with the data inside: scene, paths, plots and
+In: a recording and its world. Out: the page `web/replay.html` with the data inside: scene, paths, plots and
 the onboard images, one sheet of small JPEGs. A minute's flight makes about half a megabyte.
 """
 
@@ -19,11 +19,11 @@ from common.files import write_whole
 from mission.log.euler_angles import yaw_rad
 from mission.view import shapes
 from mission.view.flight_snapshot import distances_m
-from mission.view.page_arrays import Json, array_data, mesh_data
 from mission.view.panel import ACTION_NAMES
 from mission.view.replay_file import Recording
 from mission.view.snapshot_images import onboard_eye
 from mission.view.vehicle_model import turned_rad
+from mission.view.web.page_arrays import Json, array_data, mesh_data
 from sim.world.world import WorldMap
 
 STRIDE = 5  # frames of the flight per moment of the page: 10 a second
@@ -42,7 +42,7 @@ def write_html(recording: Recording, world: WorldMap, target: Path, title: str) 
         OSError: it cannot be written.
     """
     page, webgl = (
-        files("mission.view").joinpath(name).read_text(encoding="utf-8") for name in ("replay.html", "webgl.js")
+        files("mission.view.web").joinpath(name).read_text(encoding="utf-8") for name in ("replay.html", "webgl.js")
     )
     data = json.dumps(page_data(recording.every(STRIDE), world, title)).replace("</", "<\\/")
     write_whole(target, page.replace("/*WEBGL*/", webgl).replace("/*DATA*/", data).encode())

@@ -1,0 +1,1 @@
+"""What pages that stand alone share."""
