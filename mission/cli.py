@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 
 from mission.benchmark import benchmark_command
+from mission.campaign import command as campaign_command
 from mission.console.command_refusal import refuse
 from mission.console.late_command import LateCommand
 from mission.console.name_checks import check_file
@@ -142,6 +143,7 @@ app.command()(benchmark_command.benchmark)
 app.command(cls=LateCommand)(park_command.park)
 app.command()(replay_command.replay)
 app.command(name="test")(scenario_command.fly_scenarios)
+app.command(name="campaign")(campaign_command.fly_campaign_file)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)
 app.command(name="eval")(training_commands.evaluate)
 app.command()(training_commands.export)

@@ -1,0 +1,21 @@
+"""Flies one run of a campaign; what workers do, wherever they are."""
+
+from mission.campaign.campaign import Campaign
+from mission.campaign.runs import Order, Record, lost, record_of
+from mission.campaign.varying import KeyFault, varied
+from mission.console.option_checks import UserError
+from mission.scenario.runner import run_scenario
+from mission.scenario.scenario import Scenario
+
+
+def fly_run(campaign: Campaign, order: Order) -> Record:
+    """The record of one run; what cannot be flown with its values is a finding, too."""
+    scenario = campaign.scenario
+    assert isinstance(scenario, Scenario)  # a file's name was read when the campaign was
+    try:
+        result = run_scenario(varied(scenario, order.values), order.seed)
+    except (UserError, KeyFault) as error:
+        return lost(order, f"cannot be flown: {error}")
+    except Exception as error:  # noqa: BLE001  a fault of the program at these values is what a campaign looks for
+        return lost(order, f"{type(error).__name__}: {error}")
+    return record_of(order, result, campaign.margin)
