@@ -12,6 +12,7 @@ from common.params import Parameter
 from docs.generate.mavlink_page import mavlink_text
 from docs.generate.tasks_page import tasks_text
 from docs.generate.training_page import training_text
+from mission.campaign import schema as campaign_schema
 from mission.flight import Flight, FlightConfig
 from mission.scenario.schema import reference_text, schema_text
 from mission.simulator.simulator_params import simulator_parameters
@@ -107,6 +108,8 @@ def generated_pages() -> dict[Path, str]:
         REFERENCE / "tasks.md": tasks_text(),
         REFERENCE / "scenario-keys.md": reference_text(),
         REFERENCE / "scenario.schema.json": schema_text(),
+        REFERENCE / "campaign-keys.md": campaign_schema.reference_text(),
+        REFERENCE / "campaign.schema.json": campaign_schema.schema_text(),
     }
 
 

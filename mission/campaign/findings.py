@@ -1,6 +1,7 @@
 """What a campaign has found, as JSON: `summary.json`."""
 
 import json
+import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from mission.scenario.keeping import keep_scenario
 from mission.scenario.scenario import Scenario
 
 WORST_COUNT = 10
-SUMMARY_FILE = "summary.json"
+SUMMARY_FILE, WORST_FOLDER = "summary.json", "worst"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,7 @@ def findings_of(campaign: Campaign, samples: list[Record], searches: list[Any], 
     for search in searches:
         every |= {record.key: record for record in getattr(search, "records", ())}
     worst = worst_first(list(every.values()))[:WORST_COUNT]
+    shutil.rmtree(folder / WORST_FOLDER, ignore_errors=True)  # of an earlier end, with fewer runs
     return Findings(
         campaign,
         tuple(samples),
@@ -80,7 +82,7 @@ def findings_of(campaign: Campaign, samples: list[Record], searches: list[Any], 
 def _kept(campaign: Campaign, record: Record, folder: Path) -> str:
     scenario = campaign.scenario
     assert isinstance(scenario, Scenario)
-    own = folder / "worst" / f"{record.phase}-{record.number}"
+    own = folder / WORST_FOLDER / f"{record.phase}-{record.number}"
     try:
         exact = varied(scenario, record.values)
     except KeyFault:
@@ -102,3 +104,8 @@ def _search_json(found: Any) -> dict[str, Any]:
 def write_summary(findings: Findings, folder: Path) -> None:
     """Writes `summary.json`."""
     write_whole(folder / SUMMARY_FILE, (json.dumps(findings.as_json(), indent=1, ensure_ascii=False) + "\n").encode())
+
+
+def fraction_text(fraction: Fraction) -> str:
+    """A fraction as people read it."""
+    return f"{fraction.value:.1%} ({fraction.count} of {fraction.total}; 95 % interval {fraction.low:.1%} to {fraction.high:.1%})"

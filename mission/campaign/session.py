@@ -11,12 +11,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from mission.campaign.campaign import Campaign
-from mission.campaign.findings import SUMMARY_FILE, Findings, findings_of, write_summary
+from mission.campaign.findings import SUMMARY_FILE, Findings, findings_of, fraction_text, write_summary
 from mission.campaign.flying import Flights, Note, Workers, fly_campaign
 from mission.campaign.report.page import REPORT_FILE, write_report
 from mission.campaign.run_store import RunStore
 from mission.campaign.runs import Record
-from mission.campaign.statistics import Fraction
 from mission.console.option_checks import UserError
 from mission.console.terminal import print_line
 
@@ -89,11 +88,6 @@ def _shown(console: Console, campaign: Campaign, kept: int) -> Iterator[Note]:
                 print_line(console, f"{count} runs flown, {failed} failed")
 
         yield note
-
-
-def fraction_text(fraction: Fraction) -> str:
-    """A fraction as people read it."""
-    return f"{fraction.value:.1%} ({fraction.count} of {fraction.total}; 95 % interval {fraction.low:.1%} to {fraction.high:.1%})"
 
 
 def _tell(findings: Findings, folder: Path, console: Console) -> None:
