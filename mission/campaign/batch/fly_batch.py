@@ -1,0 +1,170 @@
+"""Flies runs of a campaign in one batch: the kernels advance all vehicles in a launch, each has its flight controller.
+
+In: orders whose scenarios are alike but for their varied values. Out: a record of each, judged by the checks that judge
+any flight.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any
+
+from common.airframe import load_airframe
+from common.clock import process_time_s
+from common.kernels import FRAME_TICKS, FRAME_US
+from mission.campaign.batch.batch_flight import BatchFlight
+from mission.campaign.batch.history import BatchHistory
+from mission.campaign.batch.script import Steps, fly
+from mission.campaign.campaign import Campaign
+from mission.campaign.runs import Order, Record, lost, record_of
+from mission.campaign.varying import KeyFault, varied
+from mission.client import ScriptError
+from mission.console.option_checks import UserError
+from mission.flight_config import FlightConfig
+from mission.scenario.flight.building import flight_configs, set_charge
+from mission.scenario.flight.fault_timeline import FaultTimeline
+from mission.scenario.flight.run import Run, VehicleRun, Witness
+from mission.scenario.judging.judge import judge
+from mission.scenario.result import ScenarioResult
+from mission.scenario.runner import AFTER_S
+from mission.scenario.scenario import Scenario
+from mission.simulator.flight_rig import flight_wind, flight_world
+from sim.bodies.vehicles import class_of
+from sim.rig import Rig
+from sim.sensors.sensors import sensor_model
+
+
+@dataclass
+class _Flown:
+    """One run of the batch."""
+
+    order: Order
+    run: Run
+    faults: FaultTimeline
+    steps: Steps
+    quiet_until_s: float = 0.0
+    is_done: bool = False
+    end_us: int = 0
+    """When it is over; 0: not yet known."""
+    error: str = ""
+    marks: list[str] = field(default_factory=list)
+
+    @property
+    def vehicle(self) -> VehicleRun:
+        return self.run.vehicles[0]
+
+    @property
+    def flight(self) -> Any:
+        return self.vehicle.flight
+
+    def frame(self) -> None:
+        """One frame of it, after the kernels': as `Flight.end_frame`, then what the runner of a scenario looks at."""
+        flight = self.flight
+        if self.quiet_until_s > flight.time_us * 1e-6 + FRAME_US * 1e-6:
+            flight.pass_frame()
+        else:
+            flight.end_frame()
+            self._go_on()
+        self.faults.frame(flight.time_us)
+        self.vehicle.witness.look()
+
+    def _go_on(self) -> None:
+        time_us, end_us = self.flight.time_us, round(self.run.scenario.time_max_s * 1e6)
+        if not self.is_done:
+            try:
+                self.quiet_until_s = next(self.steps)
+                return
+            except StopIteration:
+                pass
+            except ScriptError as error:
+                self.error = str(error)
+            self.is_done, self.quiet_until_s = True, inf
+            self.end_us = min(time_us + round(AFTER_S * 1e6), end_us - 1)
+
+
+def fly_batch(campaign: Campaign, orders: Sequence[Order]) -> list[Record]:
+    """The record of each order."""
+    begun_s = process_time_s()
+    records: dict[int, Record] = {}
+    made: list[tuple[Order, Scenario, FlightConfig]] = []
+    assert isinstance(campaign.scenario, Scenario)
+    for k, order in enumerate(orders):
+        try:
+            scenario = varied(campaign.scenario, order.values)
+            made.append((order, scenario, flight_configs(scenario, order.seed)[0]))
+        except (UserError, KeyFault) as error:
+            records[k] = lost(order, f"cannot be flown: {error}")
+    if made:
+        flown = _fly(made)
+        took_s = (process_time_s() - begun_s) / len(flown)
+        left = iter(flown)
+        for k in range(len(orders)):
+            if k not in records:
+                order, result = next(left)
+                records[k] = record_of(order, _with_cpu(result, took_s), campaign.margin)
+    return [records[k] for k in range(len(orders))]
+
+
+def _with_cpu(result: ScenarioResult, cpu_s: float) -> ScenarioResult:
+    from dataclasses import replace
+
+    return replace(result, cpu_s=cpu_s)
+
+
+def _rig(config: FlightConfig, world: Any, count: int) -> Rig:
+    airframe = load_airframe(config.airframe)
+    vehicle, body = class_of(airframe)
+    return Rig(
+        airframe, world, sensor_model(noise_scale=config.noise, home=config.home),
+        flight_wind(config.wind_m_s, config.wind_from_deg), home=config.home, vehicle_count=count, body=body,
+        law=vehicle.law, start_ne_m=config.start_ne_m,
+    )  # fmt: skip
+
+
+def _fly(made: list[tuple[Order, Scenario, FlightConfig]]) -> list[tuple[Order, ScenarioResult]]:
+    first = made[0][2]
+    world = flight_world(first)
+    rig = _rig(first, world, len(made))
+    flown = [_begun(order, scenario, BatchFlight(config, scenario, rig, i, world)) for i, (order, scenario, config) in enumerate(made)]
+    flights = [each.flight for each in flown]
+    history = BatchHistory(rig, len(made))
+    time_us = 0
+    last_us = max(round(scenario.time_max_s * 1e6) for _, scenario, _ in made)
+    running = flown
+    while running and time_us < last_us:
+        for each in running:
+            each.flight.begin_frame()
+        rig.advance(FRAME_TICKS)
+        time_us += FRAME_US
+        for each in running:
+            each.frame()
+        history.note(time_us, flights)
+        running = [each for each in running if not _is_over(each, time_us)]
+    return [(each.order, _result(each, history, i)) for i, each in enumerate(flown)]
+
+
+def _is_over(each: _Flown, time_us: int) -> bool:
+    end_us = each.end_us or round(each.run.scenario.time_max_s * 1e6)
+    return time_us >= end_us
+
+
+def _begun(order: Order, scenario: Scenario, flight: BatchFlight) -> _Flown:
+    config = scenario.fleet[0]
+    set_charge(flight, config.start.battery)
+    any_flight: Any = flight
+    vehicle = VehicleRun(1, config, any_flight, Witness(any_flight))
+    run = Run(scenario, [vehicle])
+    return _Flown(order, run, FaultTimeline(run, scenario.faults), fly(run, vehicle))
+
+
+def _result(each: _Flown, history: BatchHistory, i_vehicle: int) -> ScenarioResult:
+    scenario, end_us = each.run.scenario, each.flight.time_us
+    error = each.error if each.is_done else f"the script was not done after {scenario.time_max_s:g} s"
+    if scenario.fails_with:
+        is_so = scenario.fails_with in error
+        error = "" if is_so else f"the script was to fail with '{scenario.fails_with}'"
+    elif not error and each.faults.left:
+        error = "; ".join(f"a fault never happened: {f.when or f'at {f.at:g} s'}" for f in each.faults.left)
+    end_s = round(end_us * 1e-6, 6)
+    checks = judge(each.run, [history.of(i_vehicle, end_us)], end_s)
+    return ScenarioResult(scenario.name or "scenario", "", each.order.seed, checks, error, end_s)
