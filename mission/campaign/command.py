@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from mission.campaign.campaign import Campaign
     from mission.campaign.flying import Workers
 
+BATCH = 50  # runs in one launch: more take memory, and are no faster each
 RUN_MAX_S = 300.0  # wall clock; a two-minute flight takes a second or two
 
 
@@ -30,6 +31,9 @@ def fly_campaign_file(
     run_max: Annotated[
         float, typer.Option(min=1.0, help="A run that takes longer [s, wall clock] hangs, and is given up.")
     ] = RUN_MAX_S,
+    batch: Annotated[
+        bool, typer.Option("--batch", help="Fly many in one launch of the kernels, without MAVLink: where it can be.")
+    ] = False,
     ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Fly on this Ray cluster instead.")] = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON schema of campaign files, and end.")] = False,
 ) -> None:
@@ -42,6 +46,7 @@ def fly_campaign_file(
         typer.echo(schema_text(), nl=False)
         return
     try:
+        from mission.campaign.batch.refusal import batch_refusal
         from mission.campaign.campaign_file import read_campaign
 
         if file is None:
@@ -50,6 +55,8 @@ def fly_campaign_file(
         if runs is not None:
             campaign = campaign.model_copy(update={"runs": runs})
         with learn_extra():
+            if batch and (ray is not None or (why := batch_refusal(campaign))):
+                raise UserError("--batch and --ray: choose one" if ray is not None else why)
             with loading(Console(stderr=True)):
                 from mission.campaign.checking import check_campaign
                 from mission.campaign.session import campaign_session
@@ -59,7 +66,7 @@ def fly_campaign_file(
             code = campaign_session(
                 campaign,
                 folder or Path("campaigns") / campaign.name,
-                lambda: _workers(campaign, count, run_max, ray),
+                lambda: _workers(campaign, count, run_max, ray, is_batch=batch),
                 must_exist=resume,
             )
     except UserError as error:
@@ -67,11 +74,11 @@ def fly_campaign_file(
     raise typer.Exit(code)
 
 
-def _workers(campaign: "Campaign", jobs: int, run_max_s: float, ray: str | None) -> "Workers":
+def _workers(campaign: "Campaign", jobs: int, run_max_s: float, ray: str | None, *, is_batch: bool) -> "Workers":
     if ray is not None:
         from mission.campaign.workers.ray_cluster import RayCluster
 
         return RayCluster(campaign, ray)
     from mission.campaign.workers.processes import Processes
 
-    return Processes(campaign, jobs, run_max_s)
+    return Processes(campaign, jobs, run_max_s, BATCH if is_batch else 1)

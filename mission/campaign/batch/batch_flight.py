@@ -5,7 +5,6 @@ from typing import Any
 
 from autopilot.flight_controller import FlightController
 from common.airframe import load_airframe
-from common.kernels import FRAME_US
 from mission.campaign.batch.row_rig import RowRig
 from mission.flight_base import FlightBase
 from mission.flight_config import FlightConfig, flight_parameters
@@ -18,8 +17,6 @@ from sim.bodies.vehicles import class_of
 from sim.rig import Rig
 from sim.sensors.sensors import sensor_model
 from sim.world.world import WorldMap
-
-QUIET_FRAMES = 5  # while a script waits, its flight controller's Python part looks ten times a second
 
 
 class BatchFlight(FlightBase):
@@ -52,35 +49,24 @@ class BatchFlight(FlightBase):
             host_ports(rig, i_vehicle), self.params, self.airframe, config.home, self.texts,
             injector=self.injector, vehicle=vehicle,
         )  # fmt: skip
-        self._seen_us = 0
+
+    def see(self) -> None:
+        """Runs the Python part of the flight controller."""
+        self.controller.frame(self.time_us)
+        self._note_ready()
 
     def begin_frame(self) -> None:
-        self.injector.frame(self.time_us)
+        """Nothing, as the three after it: the batch advances all, and keeps their history."""
 
     def advancing(self, ticks: range) -> Iterator[None]:
-        """The batch advances all."""
         del ticks
         return iter(())
 
     def end_frame(self) -> None:
-        self.time_us += FRAME_US
         self.see()
 
-    def see(self) -> None:
-        """Runs the Python part of the flight controller."""
-        self._seen_us = self.time_us
-        self.controller.frame(self.time_us)
-        self._note_ready()
-
-    def pass_frame(self) -> None:
-        """Lets a frame pass in which nothing is to be decided."""
-        self.time_us += FRAME_US
-        if self.time_us - self._seen_us >= QUIET_FRAMES * FRAME_US:
-            self.see()
-
     def restart(self) -> None:
-        """Nobody asks for it in a batch."""
+        raise NotImplementedError
 
     def close(self) -> History:
-        """The batch keeps the history."""
         raise NotImplementedError

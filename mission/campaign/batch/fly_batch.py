@@ -5,8 +5,7 @@ any flight.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from math import inf
+from dataclasses import dataclass, replace
 from typing import Any
 
 from common.airframe import load_airframe
@@ -33,6 +32,8 @@ from sim.bodies.vehicles import class_of
 from sim.rig import Rig
 from sim.sensors.sensors import sensor_model
 
+QUIET_US = 5 * FRAME_US  # while a script waits, its flight controller's Python part looks ten times a second
+
 
 @dataclass
 class _Flown:
@@ -42,12 +43,12 @@ class _Flown:
     run: Run
     faults: FaultTimeline
     steps: Steps
-    quiet_until_s: float = 0.0
+    look_us: int = 0
+    """Until then nothing is to be decided."""
     is_done: bool = False
     end_us: int = 0
-    """When it is over; 0: not yet known."""
+    """When it is over."""
     error: str = ""
-    marks: list[str] = field(default_factory=list)
 
     @property
     def vehicle(self) -> VehicleRun:
@@ -57,29 +58,32 @@ class _Flown:
     def flight(self) -> Any:
         return self.vehicle.flight
 
-    def frame(self) -> None:
-        """One frame of it, after the kernels': as `Flight.end_frame`, then what the runner of a scenario looks at."""
+    def frame(self, time_us: int) -> bool:
+        """One frame of it, after the kernels'; whether its flight controller's Python part was run."""
         flight = self.flight
-        if self.quiet_until_s > flight.time_us * 1e-6 + FRAME_US * 1e-6:
-            flight.pass_frame()
-        else:
-            flight.end_frame()
-            self._go_on()
-        self.faults.frame(flight.time_us)
-        self.vehicle.witness.look()
+        flight.time_us = time_us
+        is_seen = time_us >= self.look_us
+        if is_seen:
+            flight.see()
+            until_us = self._go_on(time_us)
+            self.look_us = time_us + FRAME_US if until_us == 0 else min(until_us, time_us + QUIET_US)
+        if self.run.scenario.faults:
+            self.faults.frame(time_us)
+        return is_seen
 
-    def _go_on(self) -> None:
-        time_us, end_us = self.flight.time_us, round(self.run.scenario.time_max_s * 1e6)
-        if not self.is_done:
-            try:
-                self.quiet_until_s = next(self.steps)
-                return
-            except StopIteration:
-                pass
-            except ScriptError as error:
-                self.error = str(error)
-            self.is_done, self.quiet_until_s = True, inf
-            self.end_us = min(time_us + round(AFTER_S * 1e6), end_us - 1)
+    def _go_on(self, time_us: int) -> int:
+        """Lets the script go on; until when it waits [us], 0: it looks each frame."""
+        if self.is_done:
+            return self.end_us
+        try:
+            return round(next(self.steps) * 1e6)
+        except StopIteration:
+            pass
+        except ScriptError as error:
+            self.error = str(error)
+        self.is_done = True
+        self.end_us = min(time_us + round(AFTER_S * 1e6), self.end_us - 1)
+        return self.end_us
 
 
 def fly_batch(campaign: Campaign, orders: Sequence[Order]) -> list[Record]:
@@ -106,8 +110,6 @@ def fly_batch(campaign: Campaign, orders: Sequence[Order]) -> list[Record]:
 
 
 def _with_cpu(result: ScenarioResult, cpu_s: float) -> ScenarioResult:
-    from dataclasses import replace
-
     return replace(result, cpu_s=cpu_s)
 
 
@@ -125,27 +127,25 @@ def _fly(made: list[tuple[Order, Scenario, FlightConfig]]) -> list[tuple[Order, 
     first = made[0][2]
     world = flight_world(first)
     rig = _rig(first, world, len(made))
-    flown = [_begun(order, scenario, BatchFlight(config, scenario, rig, i, world)) for i, (order, scenario, config) in enumerate(made)]
+    flown = [
+        _begun(order, scenario, BatchFlight(config, scenario, rig, i, world))
+        for i, (order, scenario, config) in enumerate(made)
+    ]
     flights = [each.flight for each in flown]
-    history = BatchHistory(rig, len(made))
-    time_us = 0
-    last_us = max(round(scenario.time_max_s * 1e6) for _, scenario, _ in made)
-    running = flown
-    while running and time_us < last_us:
-        for each in running:
-            each.flight.begin_frame()
+    history = BatchHistory(rig, flights)
+    impacts = rig.rows["truth"]["impact_speed"]
+    time_us, running = 0, list(enumerate(flown))
+    while running:
         rig.advance(FRAME_TICKS)
         time_us += FRAME_US
-        for each in running:
-            each.frame()
-        history.note(time_us, flights)
-        running = [each for each in running if not _is_over(each, time_us)]
+        seen = [i for i, each in running if each.frame(time_us)]
+        if impacts.any():
+            for _, each in running:
+                each.vehicle.witness.look()
+        history.note(time_us, seen)
+        if len(seen) > 0:
+            running = [(i, each) for i, each in running if time_us < each.end_us]
     return [(each.order, _result(each, history, i)) for i, each in enumerate(flown)]
-
-
-def _is_over(each: _Flown, time_us: int) -> bool:
-    end_us = each.end_us or round(each.run.scenario.time_max_s * 1e6)
-    return time_us >= end_us
 
 
 def _begun(order: Order, scenario: Scenario, flight: BatchFlight) -> _Flown:
@@ -154,7 +154,8 @@ def _begun(order: Order, scenario: Scenario, flight: BatchFlight) -> _Flown:
     any_flight: Any = flight
     vehicle = VehicleRun(1, config, any_flight, Witness(any_flight))
     run = Run(scenario, [vehicle])
-    return _Flown(order, run, FaultTimeline(run, scenario.faults), fly(run, vehicle))
+    end_us = round(scenario.time_max_s * 1e6)
+    return _Flown(order, run, FaultTimeline(run, scenario.faults), fly(run, vehicle), end_us=end_us)
 
 
 def _result(each: _Flown, history: BatchHistory, i_vehicle: int) -> ScenarioResult:

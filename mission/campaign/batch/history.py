@@ -1,5 +1,6 @@
 """What every vehicle of a batch did, frame by frame, as the recorder of a flight keeps it for its checks."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,18 +19,24 @@ class BatchHistory:
 
     Args:
         rig: of all.
-        count: of vehicles.
+        flights: of each row.
     """
 
-    def __init__(self, rig: Rig, count: int) -> None:
-        self._rig, self._count = rig, count
+    def __init__(self, rig: Rig, flights: Sequence[BatchFlight]) -> None:
+        self._rig, self._states = rig, [flight.controller.state for flight in flights]
+        self._now = np.zeros(len(flights), HISTORY)  # what flight controllers said last
         self._chunks: list[np.ndarray[Any, Any]] = []
         self._frames = 0
 
-    def note(self, time_us: int, flights: list[BatchFlight]) -> None:
-        """Notes the frame that is ending."""
+    def note(self, time_us: int, seen: Sequence[int]) -> None:
+        """Notes the frame that is ending.
+
+        Args:
+            time_us: of its end.
+            seen: the rows whose flight controller has run in it.
+        """
         if self._frames % CHUNK_FRAMES == 0:
-            self._chunks.append(np.empty((CHUNK_FRAMES, self._count), HISTORY))
+            self._chunks.append(np.empty((CHUNK_FRAMES, len(self._states)), HISTORY))
         row = self._chunks[-1][self._frames % CHUNK_FRAMES]
         self._frames += 1
         truth, estimate = self._rig.rows["truth"], self._rig.rows["autopilot.ekf.rows"]["estimate"]
@@ -38,11 +45,13 @@ class BatchHistory:
         row["pos_ned_est"], row["vel_ned_est"] = estimate["pos_ned"], estimate["vel_ned"]
         row["q_est"] = estimate["q_ned_from_frd"]
         row["airspeed"] = np.where(estimate["flags"] & int(AIRSPEED_VALID), estimate["airspeed"], np.nan)
-        states = [flight.controller.state for flight in flights]
-        row["is_armed"] = [state.is_armed for state in states]
-        row["mode"] = [state.mode for state in states]
-        row["mission_seq"] = [state.mission_current for state in states]
-        row["battery_remaining"] = [state.battery_remaining for state in states]
+        now = self._now
+        for i in seen:
+            state = self._states[i]
+            now["is_armed"][i], now["mode"][i] = state.is_armed, state.mode
+            now["mission_seq"][i], now["battery_remaining"][i] = state.mission_current, state.battery_remaining
+        for name in ("is_armed", "mode", "mission_seq", "battery_remaining"):
+            row[name] = now[name]
 
     def of(self, i_vehicle: int, end_us: int) -> History:
         """Of one vehicle until its end."""

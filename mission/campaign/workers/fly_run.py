@@ -1,11 +1,22 @@
 """Flies one run of a campaign; what workers do, wherever they are."""
 
+from collections.abc import Sequence
+
 from mission.campaign.campaign import Campaign
 from mission.campaign.runs import Order, Record, lost, record_of
 from mission.campaign.varying import KeyFault, varied
 from mission.console.option_checks import UserError
 from mission.scenario.runner import run_scenario
 from mission.scenario.scenario import Scenario
+
+
+def fly_chunk(campaign: Campaign, orders: Sequence[Order]) -> list[Record]:
+    """The records of runs: one by itself, several in a batch."""
+    if len(orders) == 1:
+        return [fly_run(campaign, orders[0])]
+    from mission.campaign.batch.fly_batch import fly_batch
+
+    return fly_batch(campaign, orders)
 
 
 def fly_run(campaign: Campaign, order: Order) -> Record:
