@@ -9,11 +9,15 @@ from typing import Any, Protocol
 
 from mission.campaign.campaign import Campaign
 from mission.campaign.run_store import RunStore
-from mission.campaign.runs import SAMPLE, Order, Record
+from mission.campaign.runs import Order, Record
 from mission.campaign.sampling import sample_orders
 
 Note = Callable[[Record, int], None]
 """Called with each run that is flown, and how many its phase has."""
+
+
+class Stopped(Exception):
+    """Nobody is left to fly; the message says why. What was flown is kept."""
 
 
 class Workers(Protocol):
@@ -65,6 +69,3 @@ def search_of(flights: Flights, search: Any, phase: str) -> Any:
 
     kinds: dict[str, Callable[[Flights, Any, str], Any]] = {"bisect": bisect, "worst": find_worst, "rare": estimate_rare}
     return kinds[search.name_chosen](flights, search.chosen, phase)
-
-
-__all__ = ["SAMPLE", "Flights", "Workers", "fly_campaign"]

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from mission.campaign.campaign import Campaign
 from mission.campaign.findings import SUMMARY_FILE, Findings, findings_of, fraction_text, write_summary
-from mission.campaign.flying import Flights, Note, Workers, fly_campaign
+from mission.campaign.flying import Flights, Note, Stopped, Workers, fly_campaign
 from mission.campaign.report.page import REPORT_FILE, write_report
 from mission.campaign.run_store import RunStore
 from mission.campaign.runs import Record
@@ -21,10 +21,6 @@ from mission.console.terminal import print_line
 
 WIDTH = 150  # where there is no terminal
 LINE_EVERY = 100  # runs, where there is no terminal
-
-
-class Stopped(Exception):
-    """Nobody is left to fly; the message says why. What was flown is kept."""
 
 
 def identity_of(campaign: Campaign) -> dict[str, Any]:
