@@ -63,7 +63,10 @@ def _check_keys(campaign: Campaign, scenario: Scenario, root: Located) -> None:
     for key, distribution in campaign.vary.items():
         location, text = location_at(root, ("vary", key))
         if key == SEED_KEY:
-            if distribution.integers is None or not 0 <= distribution.integers[0] <= distribution.integers[1] <= SEED_MAX:
+            if (
+                distribution.integers is None
+                or not 0 <= distribution.integers[0] <= distribution.integers[1] <= SEED_MAX
+            ):
                 raise UserError(note_at(location, text, f"must be integers from 0 to {SEED_MAX}"))
             continue
         try:

@@ -2,7 +2,6 @@
 
 from mission.campaign.campaign import SEED_KEY, Campaign
 from mission.campaign.varying import varied
-from mission.console.option_checks import UserError
 from mission.scenario.flight.building import check_scenario
 from mission.scenario.scenario import Scenario
 

@@ -57,7 +57,9 @@ def fly_campaign(flights: Flights, runs: int) -> tuple[list[Record], list[Any]]:
     """The samples, and what each search has found."""
     campaign = flights.campaign
     samples = flights.fly(sample_orders(campaign, runs))
-    found = [search_of(flights, search, f"{search.name_chosen}-{number}") for number, search in enumerate(campaign.search)]
+    found = [
+        search_of(flights, search, f"{search.name_chosen}-{number}") for number, search in enumerate(campaign.search)
+    ]
     return samples, found
 
 
@@ -67,5 +69,9 @@ def search_of(flights: Flights, search: Any, phase: str) -> Any:
     from mission.campaign.search.rare_failures import estimate_rare
     from mission.campaign.search.worst_case import find_worst
 
-    kinds: dict[str, Callable[[Flights, Any, str], Any]] = {"bisect": bisect, "worst": find_worst, "rare": estimate_rare}
+    kinds: dict[str, Callable[[Flights, Any, str], Any]] = {
+        "bisect": bisect,
+        "worst": find_worst,
+        "rare": estimate_rare,
+    }
     return kinds[search.name_chosen](flights, search.chosen, phase)

@@ -89,7 +89,11 @@ def _shown(console: Console, campaign: Campaign, kept: int) -> Iterator[Note]:
 def _tell(findings: Findings, folder: Path, console: Console) -> None:
     campaign = findings.campaign
     if findings.samples:
-        met = "" if campaign.success_min is None else f"; required: {campaign.require}, {'met' if findings.is_met else 'not met'}"
+        met = (
+            ""
+            if campaign.success_min is None
+            else f"; required: {campaign.require}, {'met' if findings.is_met else 'not met'}"
+        )
         print_line(console, f"success {fraction_text(findings.success)}{met}")
     lost = [record for record in findings.samples if record.is_lost]
     for record in lost[:3]:
@@ -107,7 +111,9 @@ def _tell(findings: Findings, folder: Path, console: Console) -> None:
 
 
 def _sensitivity_table(findings: Findings) -> Table:
-    table = Table("varied", "rank correlation with the least margin", "explained", "success from least to greatest value")
+    table = Table(
+        "varied", "rank correlation with the least margin", "explained", "success from least to greatest value"
+    )
     for each in findings.sensitivities:
         rho = "" if each.rank_correlation is None else f"{each.rank_correlation:+.2f}"
         success = " ".join(f"{b.success.value:.0%}" for b in each.bins)
@@ -123,5 +129,7 @@ def _worst_table(findings: Findings) -> Table:
         margin = "" if record.margin is None else f"{record.margin:.3g} {record.unit} ({record.check})"
         values = ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in record.values.items())
         failed = "; ".join(record.failures)
-        table.add_row(f"{record.phase} {record.number}", str(record.seed), escape(margin), escape(values), escape(failed[:80]))
+        table.add_row(
+            f"{record.phase} {record.number}", str(record.seed), escape(margin), escape(values), escape(failed[:80])
+        )
     return table

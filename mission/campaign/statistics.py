@@ -130,13 +130,20 @@ def _groups(
     values = [record.values[key] for record in records]
     distribution = campaign.vary[key]
     if distribution.choice is not None:
-        found = [(value, np.flatnonzero([each == value for each in values])) for value in dict.fromkeys(distribution.choice)]
+        found = [
+            (value, np.flatnonzero([each == value for each in values])) for value in dict.fromkeys(distribution.choice)
+        ]
         return [(str(value), float(i), float(i), members) for i, (value, members) in enumerate(found) if len(members)]
     numbers = np.array(values, float)
     count = max(1, min(BINS_MAX, len(records) // BIN_RUNS))
     order = np.argsort(numbers, kind="stable")
     return [
-        (f"{numbers[members[0]]:.4g} to {numbers[members[-1]]:.4g}", float(numbers[members[0]]), float(numbers[members[-1]]), members)
+        (
+            f"{numbers[members[0]]:.4g} to {numbers[members[-1]]:.4g}",
+            float(numbers[members[0]]),
+            float(numbers[members[-1]]),
+            members,
+        )
         for members in np.array_split(order, count)
         if len(members)
     ]

@@ -22,7 +22,6 @@ from mission.scenario.result import CheckResult, ScenarioResult
 from mission.scenario.runner import run_scenario
 from mission.scenario.scenario import Scenario
 
-
 WIDTH = 150  # of the table where there is no terminal
 
 

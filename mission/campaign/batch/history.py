@@ -41,7 +41,11 @@ class BatchHistory:
         self._frames += 1
         truth, estimate = self._rig.rows["truth"], self._rig.rows["autopilot.ekf.rows"]["estimate"]
         row["time_us"] = time_us
-        row["pos_ned_true"], row["vel_ned_true"], row["q_true"] = truth["pos_ned"], truth["vel_ned"], truth["q_ned_from_frd"]
+        row["pos_ned_true"], row["vel_ned_true"], row["q_true"] = (
+            truth["pos_ned"],
+            truth["vel_ned"],
+            truth["q_ned_from_frd"],
+        )
         row["pos_ned_est"], row["vel_ned_est"] = estimate["pos_ned"], estimate["vel_ned"]
         row["q_est"] = estimate["q_ned_from_frd"]
         row["airspeed"] = np.where(estimate["flags"] & int(AIRSPEED_VALID), estimate["airspeed"], np.nan)

@@ -10,7 +10,14 @@ from mission.scenario.scenario import Scenario
 STEPS = ("arm", "takeoff", "goto_ned", "hold", "wait", "speed", "mark", "land", "return_home", "wait_disarmed")
 FAULTS = ("wind", "sensor", "motor", "battery")
 LEFT_OUT_CHECKS = ("separation", "following", "interventions", "reached")
-SHARED_KEYS = ("world", "home", "vehicle.airframe", "vehicles.0.airframe", "vehicle.start.ne_m", "vehicles.0.start.ne_m")
+SHARED_KEYS = (
+    "world",
+    "home",
+    "vehicle.airframe",
+    "vehicles.0.airframe",
+    "vehicle.start.ne_m",
+    "vehicles.0.start.ne_m",
+)
 
 
 def batch_refusal(campaign: Campaign) -> str:

@@ -6,7 +6,16 @@ from pathlib import Path
 
 from common.files import write_whole
 from mission.campaign.findings import SUMMARY_FILE, Findings, fraction_text
-from mission.campaign.report.plots import KEYS_MAX, Draw, boundary_plot, key_plot, map_plot, margins_plot, overview_png, svg_of
+from mission.campaign.report.plots import (
+    KEYS_MAX,
+    Draw,
+    boundary_plot,
+    key_plot,
+    map_plot,
+    margins_plot,
+    overview_png,
+    svg_of,
+)
 from mission.campaign.search.bisection import BoundaryFound
 
 REPORT_FILE, OVERVIEW_FILE = "report.html", "overview.png"

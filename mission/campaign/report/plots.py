@@ -63,7 +63,9 @@ def overview_png(findings: Findings) -> bytes:
     panels = [panel for panel in (margins_plot(findings), map_plot(findings)) if panel is not None]
     keys = [key_plot(findings, each) for each in findings.sensitivities[: 4 - len(panels)]]
     panels += keys
-    panels += [boundary_plot(s) for s in findings.searches if isinstance(s, BoundaryFound) and s.found][: 4 - len(panels)]
+    panels += [boundary_plot(s) for s in findings.searches if isinstance(s, BoundaryFound) and s.found][
+        : 4 - len(panels)
+    ]
     with mpl.rc_context({**_STYLE, "figure.facecolor": "white"}):
         figure = Figure(figsize=(10.0, 3.4 * -(-len(panels) // 2)), layout="constrained")
         figure.suptitle(findings.campaign.about or findings.campaign.name)
@@ -112,9 +114,13 @@ def key_plot(findings: Findings, sensitivity: Sensitivity) -> Draw:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.1))
         x = np.array([0.5 * (b.low + b.high) for b in bins])
         y, low, high = (np.array([getattr(b.success, name) for b in bins]) for name in ("value", "low", "high"))
-        above.errorbar(x, y, [y - low, high - y], fmt="o" if is_choice else "o-", color=PASSED_COLOUR, ms=4, lw=1.2, capsize=2)
+        above.errorbar(
+            x, y, [y - low, high - y], fmt="o" if is_choice else "o-", color=PASSED_COLOUR, ms=4, lw=1.2, capsize=2
+        )
         above.set(ylabel="success", ylim=(-0.05, 1.05))
-        labels = {str(choice): float(i) for i, choice in enumerate(dict.fromkeys(findings.campaign.vary[key].choice or ()))}
+        labels = {
+            str(choice): float(i) for i, choice in enumerate(dict.fromkeys(findings.campaign.vary[key].choice or ()))
+        }
         judged = [r for r in findings.samples if r.margin is not None][:DRAWN_MAX]
         for passed, colour in ((True, PASSED_COLOUR), (False, FAILED_COLOUR)):
             chosen = [r for r in judged if r.passed is passed]
@@ -159,7 +165,15 @@ def boundary_plot(found: BoundaryFound) -> Draw:
         for row, bracket in enumerate(found.brackets):
             for passed, colour, mark in ((True, PASSED_COLOUR, "o"), (False, FAILED_COLOUR, "X")):
                 x = [float(r.values[found.key]) for r in bracket.runs if r.passed is passed]
-                axes.scatter(x, [row] * len(x), s=24, c=colour, marker=mark, lw=0, label="" if row else "passed" if passed else "failed")
+                axes.scatter(
+                    x,
+                    [row] * len(x),
+                    s=24,
+                    c=colour,
+                    marker=mark,
+                    lw=0,
+                    label="" if row else "passed" if passed else "failed",
+                )
             if bracket.has_boundary and isfinite(bracket.middle):
                 axes.plot([bracket.middle] * 2, [row - 0.35, row + 0.35], color=INK, lw=1.5)
         axes.set_yticks(range(len(found.brackets)), [f"seed {b.seed}" for b in found.brackets])

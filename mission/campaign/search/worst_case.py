@@ -37,7 +37,9 @@ class WorstFound:
         margin = self.worst.error or _margin(self.worst)
         first = worst_first(self.records[: self.generation])[0]
         before = first.error or _margin(first)
-        return f"worst of {len(self.records)} runs: {values}: {margin}; the worst of its first {self.generation}: {before}"
+        return (
+            f"worst of {len(self.records)} runs: {values}: {margin}; the worst of its first {self.generation}: {before}"
+        )
 
 
 def find_worst(flights: Flights, search: Worst, phase: str) -> WorstFound:
@@ -49,7 +51,9 @@ def find_worst(flights: Flights, search: Worst, phase: str) -> WorstFound:
         first = len(records)
         numbers = range(first, min(first + size, search.runs))
         z = np.array([mean + std * stream(campaign, phase, number).standard_normal(count) for number in numbers])
-        orders = [Order(phase, n, search.seed, values_at(campaign, search.keys, at)) for n, at in zip(numbers, z, strict=True)]
+        orders = [
+            Order(phase, n, search.seed, values_at(campaign, search.keys, at)) for n, at in zip(numbers, z, strict=True)
+        ]
         flown = flights.fly(orders)
         records += flown
         worst = sorted(range(len(flown)), key=lambda i: (flown[i].passed, flown[i].score))

@@ -54,7 +54,7 @@ def test_a_scenario_may_be_a_file_beside_it(tmp_path):
     [
         ("runs: 10", "runz: 10", "hop.campaign.yaml:1: runz: unknown key; did you mean runs?"),
         ("{uniform: [0, 8]}", "{uniform: [8, 0]}", "hop.campaign.yaml:13: vary.wind.speed_m_s: uniform: the first bound must be"),
-        ("{uniform: [0, 8]}", "{unifrom: [0, 8]}", "hop.campaign.yaml:13: vary.wind.speed_m_s: an entry names one distribution"),
+        ("{uniform: [0, 8]}", "{unifrom: [0, 8]}", "hop.campaign.yaml:13: vary.wind.speed_m_s.unifrom: unknown key; did you mean uniform?"),
         ("{uniform: [0, 8]}", "{loguniform: [0, 8]}", "loguniform: bounds must be above 0, not 0"),
         ("{uniform: [0, 8]}", "{uniform: [0, 80]}", "hop.campaign.yaml:13: vary.wind.speed_m_s: the scenario cannot be so: wind.speed_m_s: must be at most 20, not 80"),
         ("wind.speed_m_s: {uni", "wind.sped: {uni", "vary.wind.sped: the scenario cannot be so: wind.sped: unknown key; did you mean speed_m_s?"),

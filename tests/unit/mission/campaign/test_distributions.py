@@ -27,7 +27,11 @@ def test_quantiles_are_scipys(given, peer):
 
 
 def test_no_value_is_beyond_the_bounds():
-    for given in ({"uniform": [0.1, 0.3]}, {"loguniform": [0.1, 0.3]}, {"normal": {"mean": 9, "std": 5, "min": 0.1, "max": 0.3}}):
+    for given in (
+        {"uniform": [0.1, 0.3]},
+        {"loguniform": [0.1, 0.3]},
+        {"normal": {"mean": 9, "std": 5, "min": 0.1, "max": 0.3}},
+    ):
         distribution = Distribution.model_validate(given)
         assert all(0.1 <= distribution.quantile(f) <= 0.3 for f in (-1.0, 0.0, 1e-12, 0.5, 1.0, 2.0))
 

@@ -41,9 +41,8 @@ def test_a_wrong_line_is_named(tmp_path):
 
 
 def test_another_campaign_and_a_second_process_are_refused(tmp_path):
-    with RunStore(tmp_path, {"name": "a"}):
-        with pytest.raises(UserError, match="another campaign is writing there"):
-            RunStore(tmp_path, {"name": "a"})
+    with RunStore(tmp_path, {"name": "a"}), pytest.raises(UserError, match="another campaign is writing there"):
+        RunStore(tmp_path, {"name": "a"})
     with pytest.raises(UserError, match="holds another campaign"):
         RunStore(tmp_path, {"name": "b"})
 

@@ -60,5 +60,10 @@ def test_what_rises_and_falls_is_seen_by_the_bins():
 
 
 def test_the_worst_are_first_and_those_without_a_margin_before_all():
-    records = [record(0, {}, 2.0), record(1, {}, -1.0), record(2, {}, None, error="hung"), record(3, {}, 3.0, passed=False)]
+    records = [
+        record(0, {}, 2.0),
+        record(1, {}, -1.0),
+        record(2, {}, None, error="hung"),
+        record(3, {}, 3.0, passed=False),
+    ]
     assert [each.number for each in worst_first(records)] == [2, 3, 1, 0]
