@@ -64,7 +64,7 @@ class Campaign(Part):
     scenario: Path | Scenario
     """A scenario file, or a scenario written out."""
     vary: dict[str, Distribution] = Field(min_length=1, max_length=100)
-    """Keys of the scenario with dots and numbers from 0, as `wind.speed_m_s` or `faults.0.at`; `seed` is the flight's."""
+    """Keys of the scenario with dots and numbers from 0: `wind.speed_m_s`, `faults.0.at`; `seed` is the flight's."""
     runs: int = Field(default=1000, ge=0, le=10_000_000)
     """Samples of all keys together."""
     seed: int = Field(default=1, ge=0, le=SEED_MAX)
@@ -107,6 +107,13 @@ class Campaign(Part):
         """Between which values a boundary is looked for."""
         low, high = (float(value) for value in self.vary[search.key].values)
         return low if search.low is None else search.low, high if search.high is None else search.high
+
+    @property
+    def flown(self) -> Scenario:
+        """The scenario that is flown, once its file has been read."""
+        if not isinstance(self.scenario, Scenario):
+            raise TypeError(f"{self.scenario} has not been read")
+        return self.scenario
 
     @property
     def success_min(self) -> float | None:

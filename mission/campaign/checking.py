@@ -3,7 +3,6 @@
 from mission.campaign.campaign import SEED_KEY, Campaign
 from mission.campaign.varying import varied
 from mission.scenario.flight.building import check_scenario
-from mission.scenario.scenario import Scenario
 
 
 def check_campaign(campaign: Campaign, file: str) -> None:
@@ -12,8 +11,7 @@ def check_campaign(campaign: Campaign, file: str) -> None:
     Raises:
         UserError: one cannot be flown.
     """
-    scenario = campaign.scenario
-    assert isinstance(scenario, Scenario)
+    scenario = campaign.flown
     check_scenario(scenario, file)
     for key, distribution in campaign.vary.items():
         if key != SEED_KEY:

@@ -12,7 +12,6 @@ from mission.campaign.runs import Record
 from mission.campaign.statistics import Fraction, Sensitivity, sensitivities, success_of, worst_first
 from mission.campaign.varying import KeyFault, varied
 from mission.scenario.keeping import keep_scenario
-from mission.scenario.scenario import Scenario
 
 WORST_COUNT = 10
 SUMMARY_FILE, WORST_FOLDER = "summary.json", "worst"
@@ -80,8 +79,7 @@ def findings_of(campaign: Campaign, samples: list[Record], searches: list[Any], 
 
 
 def _kept(campaign: Campaign, record: Record, folder: Path) -> str:
-    scenario = campaign.scenario
-    assert isinstance(scenario, Scenario)
+    scenario = campaign.flown
     own = folder / WORST_FOLDER / f"{record.phase}-{record.number}"
     try:
         exact = varied(scenario, record.values)
@@ -108,4 +106,5 @@ def write_summary(findings: Findings, folder: Path) -> None:
 
 def fraction_text(fraction: Fraction) -> str:
     """A fraction as people read it."""
-    return f"{fraction.value:.1%} ({fraction.count} of {fraction.total}; 95 % interval {fraction.low:.1%} to {fraction.high:.1%})"
+    interval = f"95 % interval {fraction.low:.1%} to {fraction.high:.1%}"
+    return f"{fraction.value:.1%} ({fraction.count} of {fraction.total}; {interval})"

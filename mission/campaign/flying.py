@@ -12,8 +12,8 @@ from mission.campaign.run_store import RunStore
 from mission.campaign.runs import Order, Record
 from mission.campaign.sampling import sample_orders
 
-Note = Callable[[Record, int], None]
-"""Called with each run that is flown, and how many its phase has."""
+Note = Callable[[Record], None]
+"""Called with each run that is flown."""
 
 
 class Stopped(Exception):
@@ -49,7 +49,7 @@ class Flights:
         for record in self._workers.fly(missing):
             self._store.add(record)
             self.flown_count += 1
-            self._note(record, len(orders))
+            self._note(record)
         return [self._store.records[order.key] for order in orders]
 
 

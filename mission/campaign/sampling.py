@@ -1,7 +1,7 @@
 """Which runs a campaign has: values and seeds of each, drawn from its distributions.
 
-Run k is drawn from a random stream of its own, keyed by the campaign's seed, its phase and k: the same whoever flies it,
-in whichever order, and however often the campaign was interrupted.
+Run k is drawn from a random stream of its own, keyed by the campaign's seed, its phase and k: the same whoever flies
+it, in whichever order, and however often the campaign was interrupted.
 """
 
 import zlib

@@ -67,12 +67,13 @@ def campaign_session(
 
 @contextmanager
 def _shown(console: Console, campaign: Campaign, kept: int) -> Iterator[Note]:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())  # fmt: skip
+    clocks = (TimeElapsedColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), *clocks)
     failed = count = 0
     with Progress(*columns, console=console, transient=True) as progress:
         bar = progress.add_task(campaign.name, total=max(campaign.runs, 1), completed=min(kept, campaign.runs))
 
-        def note(record: Record, planned: int) -> None:
+        def note(record: Record) -> None:
             nonlocal failed, count
             count += 1
             failed += not record.passed

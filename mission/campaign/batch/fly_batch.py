@@ -91,10 +91,9 @@ def fly_batch(campaign: Campaign, orders: Sequence[Order]) -> list[Record]:
     begun_s = process_time_s()
     records: dict[int, Record] = {}
     made: list[tuple[Order, Scenario, FlightConfig]] = []
-    assert isinstance(campaign.scenario, Scenario)
     for k, order in enumerate(orders):
         try:
-            scenario = varied(campaign.scenario, order.values)
+            scenario = varied(campaign.flown, order.values)
             made.append((order, scenario, flight_configs(scenario, order.seed)[0]))
         except (UserError, KeyFault) as error:
             records[k] = lost(order, f"cannot be flown: {error}")

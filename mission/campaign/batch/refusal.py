@@ -5,7 +5,6 @@ a world of its own is flown by processes.
 """
 
 from mission.campaign.campaign import Campaign
-from mission.scenario.scenario import Scenario
 
 STEPS = ("arm", "takeoff", "goto_ned", "hold", "wait", "speed", "mark", "land", "return_home", "wait_disarmed")
 FAULTS = ("wind", "sensor", "motor", "battery")
@@ -22,8 +21,7 @@ SHARED_KEYS = (
 
 def batch_refusal(campaign: Campaign) -> str:
     """Why it cannot be flown in a batch, in a sentence; "": it can."""
-    scenario = campaign.scenario
-    assert isinstance(scenario, Scenario)
+    scenario = campaign.flown
     fleet = scenario.fleet
     vehicle = fleet[0]
     wrong = {
@@ -41,6 +39,7 @@ def batch_refusal(campaign: Campaign) -> str:
     reasons = [reason for reason, is_so in wrong.items() if is_so]
     reasons += [f"step {s.name_chosen} needs MAVLink" for s in vehicle.script if s.name_chosen not in STEPS]
     reasons += [f"fault {f.name_chosen} needs links" for f in scenario.faults if f.name_chosen not in FAULTS]
-    reasons += [f"check {c.name_chosen} needs more than one vehicle has" for c in scenario.checks if c.name_chosen in LEFT_OUT_CHECKS]  # fmt: skip
+    checks = [each.name_chosen for each in scenario.checks]
+    reasons += [f"check {name} needs more than a batch has" for name in checks if name in LEFT_OUT_CHECKS]
     reasons += [f"{key} varies, and all are in one world" for key in campaign.vary if key.startswith(SHARED_KEYS)]
     return f"--batch: {reasons[0]}; fly it without --batch" if reasons else ""

@@ -1,4 +1,4 @@
-"""The report of a campaign as one HTML file that needs nothing else, light or dark as the reader likes, as wide as a phone."""
+"""The report of a campaign: one HTML file that needs nothing else, light or dark, as wide as a phone or wider."""
 
 from collections.abc import Iterator
 from html import escape
@@ -20,7 +20,8 @@ from mission.campaign.search.bisection import BoundaryFound
 
 REPORT_FILE, OVERVIEW_FILE = "report.html", "overview.png"
 _STYLE = """
-:root { color-scheme: light dark; --passed: #0b7285; --failed: #e8590c; --paper: #fff; --ink: #212529; --line: #ced4da; }
+:root { color-scheme: light dark; --passed: #0b7285; --failed: #e8590c;
+  --paper: #fff; --ink: #212529; --line: #ced4da; }
 @media (prefers-color-scheme: dark) {
   :root { --passed: #3bc9db; --failed: #ff922b; --paper: #16191d; --ink: #dee2e6; --line: #495057; }
 }
@@ -67,9 +68,9 @@ def _parts(findings: Findings) -> Iterator[str]:
         drawn = findings.sensitivities[:KEYS_MAX]
         yield f'<div class="plots">{"".join(_figure(key_plot(findings, each)) for each in drawn)}</div>'
         yield (
-            "<p>Success in bins of as many runs each, with 95&nbsp;% intervals (Wilson); below it the margin of each run. "
-            "Rank correlation: Spearman's, with the least margin. Explained: variance of the margins' ranks between the "
-            "bins, less what chance gives. Chance: neither is beyond what chance gives once in twenty.</p>"
+            "<p>Success in bins of as many runs each, with 95&nbsp;% intervals (Wilson); below it the margin of each "
+            "run. Rank correlation: Spearman's, with the least margin. Explained: variance of the margins' ranks "
+            "between the bins, less what chance gives. Chance: neither is beyond what chance gives once in twenty.</p>"
         )
     for search in findings.searches:
         yield f"<h2>{_TITLES.get(type(search).__name__, 'Search')}</h2>\n<p>{escape(search.sentence)}.</p>"

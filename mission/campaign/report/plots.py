@@ -1,7 +1,7 @@
 """Plots of a campaign: success by varied value, margins, where it fails, boundaries.
 
-In: findings. Out: figures in the colours of the plots of flights; as SVG their text and lines take the colour of the page
-they stand in, light or dark.
+In: findings. Out: figures in the colours of the plots of flights; as SVG their text and lines take the colour of the
+page they stand in, light or dark.
 """
 
 import io

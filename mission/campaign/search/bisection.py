@@ -12,7 +12,6 @@ from statistics import median
 from mission.campaign.campaign import Boundary, Campaign
 from mission.campaign.flying import Flights
 from mission.campaign.runs import Order, Record
-from mission.scenario.scenario import Scenario
 
 STEPS_MAX = 60  # more halvings than a double has bits left
 
@@ -63,8 +62,7 @@ class BoundaryFound:
 def bisect(flights: Flights, search: Boundary, phase: str) -> BoundaryFound:
     """Halves the interval of each seed until it is small enough."""
     campaign = flights.campaign
-    scenario = campaign.scenario
-    assert isinstance(scenario, Scenario)
+    scenario = campaign.flown
     low, high = campaign.range_of(search)
     within = (high - low) / 100.0 if search.within is None else search.within
     seeds = [scenario.seeds[0] + i for i in range(search.seeds)]

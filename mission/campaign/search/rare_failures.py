@@ -1,8 +1,8 @@
 """How probable a rare failure is: importance sampling, with what is drawn found by the cross-entropy method.
 
-In: a number of runs. Out: the probability with its 95 % interval. In the space of standard normal numbers the mean moves,
-level by level, to where margins are least (Rubinstein and Kroese 2004); then runs are drawn from there, one in five from
-the distributions themselves, so that no weight is above five (defensive mixture, Hesterberg 1995).
+In: a number of runs. Out: the probability with its 95 % interval. In the space of standard normal numbers the mean
+moves, level by level, to where margins are least (Rubinstein and Kroese 2004); then runs are drawn from there, one in
+five from the distributions themselves, so that no weight is above five (defensive mixture, Hesterberg 1995).
 """
 
 from dataclasses import dataclass
@@ -41,9 +41,11 @@ class RareFound:
     def sentence(self) -> str:
         count = len(self.records)
         if not self.failed_count:
-            return f"rare failures: none in {count} runs drawn where margins are least; below {self.high:.2g}, if they are there"
+            where = f"none in {count} runs drawn where margins are least"
+            return f"rare failures: {where}; below {self.high:.2g}, if they are there"
         interval = f"95 % interval {self.low:.2g} to {self.high:.2g}"
-        return f"rare failures: probability {self.probability:.2g}, {interval}, from {self.failed_count} failures in {count} runs"
+        counted = f"from {self.failed_count} failures in {count} runs"
+        return f"rare failures: probability {self.probability:.2g}, {interval}, {counted}"
 
 
 def estimate_rare(flights: Flights, search: Rare, phase: str) -> RareFound:

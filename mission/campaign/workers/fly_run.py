@@ -7,7 +7,6 @@ from mission.campaign.runs import Order, Record, lost, record_of
 from mission.campaign.varying import KeyFault, varied
 from mission.console.option_checks import UserError
 from mission.scenario.runner import run_scenario
-from mission.scenario.scenario import Scenario
 
 
 def fly_chunk(campaign: Campaign, orders: Sequence[Order]) -> list[Record]:
@@ -21,8 +20,7 @@ def fly_chunk(campaign: Campaign, orders: Sequence[Order]) -> list[Record]:
 
 def fly_run(campaign: Campaign, order: Order) -> Record:
     """The record of one run; what cannot be flown with its values is a finding, too."""
-    scenario = campaign.scenario
-    assert isinstance(scenario, Scenario)  # a file's name was read when the campaign was
+    scenario = campaign.flown
     try:
         result = run_scenario(varied(scenario, order.values), order.seed)
     except (UserError, KeyFault) as error:

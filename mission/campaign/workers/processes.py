@@ -1,7 +1,7 @@
 """Runs flown in processes of this machine. One that ends or hangs takes its run with it, not the campaign.
 
-In: orders. Out: records, in the order in which they are done. A process has one run at a time, or a batch; of a batch that
-is lost, each run is flown again alone, which finds the one that it was.
+In: orders. Out: records, in the order in which they are done. A process has one run at a time, or a batch; of a batch
+that is lost, each run is flown again alone, which finds the one that it was.
 """
 
 import multiprocessing

@@ -1,7 +1,7 @@
 """Runs flown on a Ray cluster (extra `ray`). A worker that dies has its runs flown again elsewhere.
 
-In: orders. Out: records, as they are done. The cluster is spoken to by a process of its own: where its head dies, Ray ends
-that process, not the campaign, which keeps what was flown.
+In: orders. Out: records, as they are done. The cluster is spoken to by a process of its own: where its head dies, Ray
+ends that process, not the campaign, which keeps what was flown.
 """
 
 import multiprocessing

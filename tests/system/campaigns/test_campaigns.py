@@ -1,10 +1,12 @@
-"""Campaigns as commands: killed and gone on with, runs that crash or hang, worst runs flown again, batches, the page's example."""
+"""Campaigns as commands: killed and gone on with, runs that crash or hang, batches, Ray, the page's example."""
 
 import json
 import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 import yaml
@@ -184,8 +186,9 @@ class Head:
         flags = ["--head", "--block", "--node-ip-address=127.0.0.1", "--port=6399", "--num-cpus=2"]
         more = ["--include-dashboard=false", "--disable-usage-stats", "--object-store-memory=100000000"]
         self._process = subprocess.Popen(
-            [os.path.join(os.path.dirname(sys.executable), "ray"), "start", *flags, *more],
-            cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, text=True, start_new_session=True,
+            [Path(sys.executable).parent / "ray", "start", *flags, *more],
+            cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, text=True,
+            start_new_session=True,
         )  # fmt: skip
         for line in self._process.stdout:
             if "Ray runtime started" in line:
@@ -199,15 +202,10 @@ class Head:
 def workers_that_fly():
     """Process numbers of Ray's workers that have a run."""
     found = []
-    for entry in os.listdir("/proc"):
-        if entry.isdigit():
-            try:
-                with open(f"/proc/{entry}/cmdline", "rb") as stream:
-                    is_busy = stream.read().startswith(b"ray::_fly")
-            except OSError:
-                continue
-            if is_busy:
-                found.append(int(entry))
+    for entry in Path("/proc").iterdir():
+        with suppress(OSError):
+            if entry.name.isdigit() and (entry / "cmdline").read_bytes().startswith(b"ray::_fly"):
+                found.append(int(entry.name))
     return found
 
 
