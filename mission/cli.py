@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 
 from mission.benchmark import benchmark_command
+from mission.campaign import command as campaign_command
 from mission.console.command_refusal import refuse
 from mission.console.late_command import LateCommand
 from mission.console.name_checks import check_file
@@ -152,6 +153,7 @@ app.command()(replay_command.replay)
 app.command()(world_command.world)
 app.command()(review_command.review)
 app.command(name="test")(scenario_command.fly_scenarios)
+app.command(name="campaign")(campaign_command.fly_campaign_file)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)
 app.command(name="eval")(training_commands.evaluate)
 app.command()(training_commands.export)

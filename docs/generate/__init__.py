@@ -13,6 +13,7 @@ from docs.generate.mavlink_page import mavlink_text
 from docs.generate.tasks_page import tasks_text
 from docs.generate.training_page import training_text
 from docs.generate.world_page import world_text
+from mission.campaign import schema as campaign_schema
 from mission.flight import Flight, FlightConfig
 from mission.scenario.schema import reference_text, schema_text
 from mission.simulator.simulator_params import simulator_parameters
@@ -109,6 +110,8 @@ def generated_pages() -> dict[Path, str]:
         REFERENCE / "world-file.md": world_text(),
         REFERENCE / "scenario-keys.md": reference_text(),
         REFERENCE / "scenario.schema.json": schema_text(),
+        REFERENCE / "campaign-keys.md": campaign_schema.reference_text(),
+        REFERENCE / "campaign.schema.json": campaign_schema.schema_text(),
     }
 
 

@@ -79,8 +79,22 @@ def parse_scenario(text: str, file: str, folder: Path) -> Scenario:
         raise UserError(str(error)) from error
     if notes:
         raise UserError(notes[0])
+    return scenario_of(root, Path(file).name.removesuffix(SUFFIX), folder)
+
+
+def scenario_of(root: Located, name: str, folder: Path) -> Scenario:
+    """The scenario of a mapping, which may be a part of a file.
+
+    Args:
+        root: the mapping.
+        name: how it is called if it does not say.
+        folder: that paths in it are seen from.
+
+    Raises:
+        UserError: it says something that is wrong.
+    """
     if not root.get("name"):
-        root.put("name", Path(file).name.removesuffix(SUFFIX))
+        root.put("name", name)
     _resolve(root, folder.resolve())
     try:
         return Scenario.model_validate(root)

@@ -26,7 +26,7 @@ def reference_text() -> str:
     schema = scenario_schema()
     parts = {"Scenario": schema, **schema["$defs"]}
     order = list(dict.fromkeys(["Scenario", *_reachable("Scenario", parts)]))
-    tables = [_part(name, parts[name]) for name in order]
+    tables = [part_table(name, parts[name]) for name in order]
     rows = "\n".join(f"| `{name}` | {unit} | {meaning} |" for name, (unit, meaning) in QUANTITIES.items())
     quantities = f"## Quantities\n\nOf conditions.\n\n| name | unit | meaning |\n|---|---|---|\n{rows}\n"
     shipped = [(path, read_scenario(path)) for path in find_files([READY])]
@@ -60,7 +60,8 @@ def _references(schema: Any) -> list[str]:
     return [name for value in schema for name in _references(value)] if isinstance(schema, list) else []
 
 
-def _part(name: str, schema: dict[str, Any]) -> str:
+def part_table(name: str, schema: dict[str, Any]) -> str:
+    """The table of one part's keys."""
     body = next((each for each in schema.get("anyOf", ()) if "properties" in each), schema)
     short = body is not schema and "enum" not in schema["anyOf"][0]
     about = body.get("description", "").split("\n\n")[0].replace("\n", " ")
@@ -95,6 +96,8 @@ def _value(schema: dict[str, Any]) -> str:
         if "prefixItems" in schema:
             return f"{len(schema['prefixItems'])} numbers"
         return f"list of {_value(schema['items'])}"
+    if "$ref" in (schema.get("additionalProperties") or {}):
+        return f"{_value(schema['additionalProperties'])} by key"
     if schema.get("type") == "object":
         return "bounds by name" if "propertyNames" in schema else "numbers by name"
     return _TYPES.get(schema.get("type", ""), "") + _bounds(schema)

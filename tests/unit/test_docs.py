@@ -47,6 +47,7 @@ RUN_BY_OTHERS = (
     f"{HONEYGUIDE} review ",  # tests/unit/mission/review/test_review_session.py
     f"{HONEYGUIDE} benchmark ",  # tests/unit/mission/follow/test_benchmark.py
     f"{HONEYGUIDE} test ",  # tests/unit/mission/scenario/test_command.py, tests/system/scenarios
+    f"{HONEYGUIDE} campaign ",  # tests/system/campaigns
     f"{HONEYGUIDE} companion ",  # tests/system/companion/test_companion.py
     *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export")),  # tests/unit/mission/train
 )
@@ -253,6 +254,7 @@ SECTIONS_OF_COMMANDS = {  # the page, and the heading under which its options ar
     "companion": ("docs/how-to/companion.md", "The companion computer"),
     "park": ("docs/how-to/rover.md", "Park it"),
     "test": ("docs/how-to/scenarios.md", "Missions as tests"),
+    "campaign": ("docs/how-to/campaigns.md", "Campaigns"),
     "play": ("docs/how-to/demonstrations.md", "Watch"),
     "drive": ("docs/how-to/demonstrations.md", "Drive"),
     "demonstrate": ("docs/how-to/demonstrations.md", "Record"),

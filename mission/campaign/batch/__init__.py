@@ -1,0 +1,1 @@
+"""Many runs of a campaign in one launch of the kernels, without MAVLink."""

@@ -1,0 +1,1 @@
+"""What a campaign has found: figures, plots, a page."""
