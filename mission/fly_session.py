@@ -14,7 +14,15 @@ from common.files import write_whole
 from common.geodesy import GeoPoint
 from common.state_folder import StateFolder
 from mission.boards.board_options import check_board, commands_of
-from mission.connections import open_images, open_links, open_page, open_stream, open_video, signing_config
+from mission.connections import (
+    open_foxglove,
+    open_images,
+    open_links,
+    open_page,
+    open_stream,
+    open_video,
+    signing_config,
+)
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import loading, print_line
 from mission.flight_options import flight_config
@@ -69,6 +77,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
     video = open_video(options.video_port, options.host, may_wait=is_reached)
     images = None if speed is None else open_images(options)
     page = open_page(options.view_port) if options.has_view else None
+    foxglove = open_foxglove(options, held)
     folder = held.enter_context(run_folder(options.run_folder))
     if state is not None and options.home is not None:
         keep_home(state, config.home)
@@ -113,7 +122,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
     if run is not None:
         run.start(flight)
     try:
-        return fly_to_the_end(flight, plan, options, speed, page, folder, console)
+        return fly_to_the_end(flight, plan, options, speed, page, folder, console, foxglove)
     finally:
         if images is not None:
             images.close()

@@ -17,7 +17,7 @@ from autopilot.mavlink.transport.links import LinkError
 from common.airframe import load_airframe
 from common.files import write_whole
 from mission.client import Running
-from mission.connections import open_links, open_page
+from mission.connections import open_foxglove, open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
 from mission.flight import Flight
@@ -83,6 +83,7 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
     except LinkError as error:
         raise UserError(str(error)) from error
     page = open_page(options.view_port) if options.has_view else None
+    foxglove = open_foxglove(options, held)
     folder = held.enter_context(run_folder(options.run_folder))
     guard = GuardSettings(is_on=options.has_guard)
     flight, companion = flight_with_driver(config, pilot, links=links, folder=folder, guard=guard)
@@ -94,7 +95,8 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
             arrivals.append(await drive(drone, flight, companion, pose_in(spot, is_reverse=options.is_reverse)))
 
     goals = _goals(flight, companion, is_reverse=options.is_reverse)
-    session = FlightSession(flight, speed, page, folder, console, score=lambda: (_state(companion),), goals=goals)
+    score = lambda: (_state(companion),)  # noqa: E731
+    session = FlightSession(flight, speed, page, folder, console, score=score, goals=goals, foxglove=foxglove)
     running = flight.drone.start(script(flight.drone))
     where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.gcs_port}"
     aim = f"drives into spot {spot.number}" if spot is not None else "waits for a goto"
