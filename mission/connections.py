@@ -144,7 +144,11 @@ def open_foxglove(options: FlightOptions, held: ExitStack) -> "FoxgloveOutputs |
         raise UserError(f"{flag}: comes with the extra 'foxglove' (docs/start/installing.md)")
     from mission.foxglove.outputs import FoxgloveOutputs
 
-    outputs = FoxgloveOutputs(has_file=options.has_mcap)
+    port = options.foxglove_port if options.has_foxglove else None
+    try:
+        outputs = FoxgloveOutputs(has_file=options.has_mcap, port=port)
+    except OSError as error:
+        raise UserError(f"--foxglove-port {port}: {error.strerror}") from error
     held.callback(outputs.close)
     return outputs
 

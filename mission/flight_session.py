@@ -65,7 +65,9 @@ class FlightSession:
         keep_for_replay(flight, path_ned, action)
         self._foxglove = foxglove
         if foxglove is not None:
-            foxglove.begin(flight, folder, path_ned)
+            foxglove.begin(flight, folder, path_ned, has_camera_thread=speed is not None)
+            if foxglove.url:
+                print_line(console, f"Foxglove connects to: {foxglove.url}")
         self._view = None
         if page is not None:
             from mission.view.live import LiveView

@@ -90,7 +90,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
             import mission.follow.onboard_camera
             import mission.follow.owner_device  # noqa: F401  (their kernels are loaded with the others)
 
-        has_camera = speed is not None or stream is not None or page is not None
+        has_camera = speed is not None or any(shown is not None for shown in (stream, page, foxglove))
         load_kernels(say, config, has_camera=has_camera)
         say("building the world")
         make_flight: Callable[..., Flight] = Flight
