@@ -16,6 +16,7 @@ from mission.console.late_command import LateCommand
 from mission.console.name_checks import check_file
 from mission.console.terminal import loading
 from mission.follow import follow_commands
+from mission.foxglove import mcap_command
 from mission.park import park_command
 from mission.train import task_commands, training_commands
 from mission.view import replay_command
@@ -140,6 +141,7 @@ app.command()(follow_commands.companion)
 app.command()(benchmark_command.benchmark)
 app.command(cls=LateCommand)(park_command.park)
 app.command()(replay_command.replay)
+app.command()(mcap_command.mcap)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)
 app.command(name="eval")(training_commands.evaluate)
 app.command()(training_commands.export)
