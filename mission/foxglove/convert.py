@@ -27,10 +27,12 @@ from mission.view.replay_file import CONFIG_KEY, PATH_KEY, info_text
 from sim.world.world import WorldMap
 
 TOPICS = (
-    "actuator_motors", "actuator_servos", "battery_status", "estimator_innovation_variances", "estimator_innovations",
-    "replay_frame", "sensor_gps", "vehicle_angular_velocity", "vehicle_angular_velocity_groundtruth",
-    "vehicle_attitude", "vehicle_attitude_groundtruth", "vehicle_attitude_setpoint", "vehicle_gps_position", "vehicle_local_position",
-    "vehicle_local_position_groundtruth", "vehicle_local_position_setpoint", "vehicle_rates_setpoint", "vehicle_status",
+    "actuator_motors", "actuator_servos", "battery_status", "estimator_innovation_variances",
+    "estimator_innovations", "replay_frame", "sensor_gps", "vehicle_angular_velocity",
+    "vehicle_angular_velocity_groundtruth", "vehicle_attitude", "vehicle_attitude_groundtruth",
+    "vehicle_attitude_setpoint", "vehicle_gps_position", "vehicle_local_position",
+    "vehicle_local_position_groundtruth", "vehicle_local_position_setpoint", "vehicle_rates_setpoint",
+    "vehicle_status",
 )  # fmt: skip
 
 

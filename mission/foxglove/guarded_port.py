@@ -87,9 +87,8 @@ class GuardedPort:
         refusal = self.refusal(line, parse_headers(BytesIO(rest)))
         if refusal:
             text = f"{refusal}\n".encode()
-            writer.write(
-                b"HTTP/1.1 403 Forbidden\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(text) + text
-            )
+            start = b"HTTP/1.1 403 Forbidden\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(text)
+            writer.write(start + text)
             await writer.drain()
             return
         behind, ahead = await asyncio.open_connection(*self._target)

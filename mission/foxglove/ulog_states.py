@@ -112,19 +112,20 @@ class UlogStates:
         """The state at a time."""
         true, est = self._motion(time_us, _GROUNDTRUTH), self._motion(time_us, "")
         status = self._read(time_us, "vehicle_status", ("arming_state", "nav_state"))
+        is_armed = status is not None and status[0] == ARMED
         battery = self._read(time_us, "battery_status", ("voltage_v", "current_a", "remaining"))
         return VehicleState(
             time_us=time_us,
             origin=self._origin(time_us),
             true=true,
             est=est,
-            setpoint=self._setpoint(time_us),
+            setpoint=self._setpoint(time_us) if is_armed else None,
             outputs=self._outputs(time_us),
             test_ratios=self._test_ratios(time_us),
             battery=None if battery is None else Battery(*battery),
             gnss=self._gnss(time_us),
             mode="" if status is None else _TITLES.get(int(status[1]), f"Mode {int(status[1])}"),
-            is_armed=status is not None and status[0] == ARMED,
+            is_armed=is_armed,
             goal_ned=self._read(time_us, "replay_frame", tuple(f"goal_ned[{i}]" for i in range(3))) or NOWHERE,
             owner=self._owner(time_us),
         )

@@ -76,9 +76,8 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
     config = park_config(options)
     pilot = _pilot(options.policy)
     with busy(console, "loading kernels") as say:
-        load_kernels(
-            say, config, has_camera=options.has_view or options.has_mcap or options.has_foxglove, others=PARKING
-        )
+        has_camera = options.has_view or options.has_mcap or options.has_foxglove
+        load_kernels(say, config, has_camera=has_camera, others=PARKING)
         spot = chosen_spot(spots_of(flight_world(config)), options)
     try:
         links = [] if speed is None else open_links(options, speed)
