@@ -84,9 +84,9 @@ class GuardedPort:
     async def _pass_on(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), REQUEST_S)
         line, _, rest = head.partition(b"\r\n")
-        refusal = self.refusal(line, parse_headers(BytesIO(rest)))
-        if refusal:
-            text = f"{refusal}\n".encode()
+        wrong = refusal(line, parse_headers(BytesIO(rest)), self._token)
+        if wrong:
+            text = f"{wrong}\n".encode()
             start = b"HTTP/1.1 403 Forbidden\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(text)
             writer.write(start + text)
             await writer.drain()
@@ -102,16 +102,23 @@ class GuardedPort:
         finally:
             ahead.close()
 
-    def refusal(self, line: bytes, headers: HTTPMessage) -> str:
-        """Why a request is not passed on; "" if it is."""
-        refusal = host_refusal(headers)
-        method, _, target = line.partition(b" ")
-        path = target.partition(b" ")[0].partition(b"?")[0].strip(b"/")
-        if refusal or method != b"GET":
-            return refusal or "not a GET"
-        if not secrets.compare_digest(path, self._token.encode()):
-            return "Connect to the whole address that was printed at the start: it holds a key."
-        return ""
+
+def refusal(line: bytes, headers: HTTPMessage, token: str) -> str:
+    """Why a request is not passed on; "" if it is.
+
+    Args:
+        line: its first.
+        headers: the others.
+        token: that the path must be.
+    """
+    wrong = host_refusal(headers)
+    method, _, target = line.partition(b" ")
+    path = target.partition(b" ")[0].partition(b"?")[0].strip(b"/")
+    if wrong or method != b"GET":
+        return wrong or "not a GET"
+    if not secrets.compare_digest(path, token.encode()):
+        return "Connect to the whole address that was printed at the start: it holds a key."
+    return ""
 
 
 async def _pump(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
