@@ -71,13 +71,13 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
     config = flight_config(options, state)
     plan = None if options.is_idle else _plan(options.plan, options.airframe, config.home)
     signing = signing_config(options, speed, state)
+    foxglove = open_foxglove(options, held)
     links = [] if speed is None else open_links(options, speed)
     stream = open_stream(options.stream_port)
     is_reached = speed is not None and not options.stream_port  # stations are told of one stream
     video = open_video(options.video_port, options.host, may_wait=is_reached)
     images = None if speed is None else open_images(options)
     page = open_page(options.view_port) if options.has_view else None
-    foxglove = open_foxglove(options, held)
     folder = held.enter_context(run_folder(options.run_folder))
     if state is not None and options.home is not None:
         keep_home(state, config.home)

@@ -145,10 +145,10 @@ def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, he
     console = Console()
     config = flight_config(options, None)
     check_ports(options.board, options.instance)
+    foxglove = open_foxglove(options, held)
     links = station_links(options, speed)
     images = open_images(options)
     page = open_page(options.view_port) if options.has_view else None
-    foxglove = open_foxglove(options, held)
     folder = held.enter_context(run_folder(options.run_folder))
     with loading(console) as say:
         from mission.fly_loop import fly_to_the_end

@@ -75,9 +75,9 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     speed = speed_of(options.speed)
     pilot, name = chosen_pilot(options)
     config = follow_config(options, has_scanner=isinstance(pilot, NavigationPilot))
+    foxglove = open_foxglove(options, held)
     links = _links(options, config, speed)
     page = open_page(options.view_port) if options.has_view else None
-    foxglove = open_foxglove(options, held)
     folder = held.enter_context(run_folder(options.run_folder))
     with busy(console, "loading kernels") as say:
         load_kernels(say, config, has_camera=page is not None)

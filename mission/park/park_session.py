@@ -79,12 +79,12 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
         has_camera = options.has_view or options.has_mcap or options.has_foxglove
         load_kernels(say, config, has_camera=has_camera, others=PARKING)
         spot = chosen_spot(spots_of(flight_world(config)), options)
+    foxglove = open_foxglove(options, held)
     try:
         links = [] if speed is None else open_links(options, speed)
     except LinkError as error:
         raise UserError(str(error)) from error
     page = open_page(options.view_port) if options.has_view else None
-    foxglove = open_foxglove(options, held)
     folder = held.enter_context(run_folder(options.run_folder))
     guard = GuardSettings(is_on=options.has_guard)
     flight, companion = flight_with_driver(config, pilot, links=links, folder=folder, guard=guard)
