@@ -97,7 +97,7 @@ NUMBERS = (
     ),
     NumbersSpec(
         "/outputs", "honeyguide.Outputs", MOTION_HZ, "commands of motors and servos",
-        {"command": {"type": "array", "items": _number("[0..1] or [-1..1], NaN left out as 0")}},
+        {"command": {"type": "array", "items": _number("[0..1] or [-1..1], motors before servos")}},
         lambda state: {"command": [value if isfinite(value) else 0.0 for value in state.outputs]},
     ),
     NumbersSpec(
