@@ -17,6 +17,7 @@ from mission.console.late_command import LateCommand
 from mission.console.name_checks import check_file
 from mission.console.terminal import loading
 from mission.follow import follow_commands
+from mission.foxglove import mcap_command
 from mission.park import park_command
 from mission.review import review_command
 from mission.scenario import command as scenario_command
@@ -154,6 +155,7 @@ app.command()(world_command.world)
 app.command()(review_command.review)
 app.command(name="test")(scenario_command.fly_scenarios)
 app.command(name="campaign")(campaign_command.fly_campaign_file)
+app.command()(mcap_command.mcap)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)
 app.command(name="eval")(training_commands.evaluate)
 app.command()(training_commands.export)

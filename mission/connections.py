@@ -1,5 +1,7 @@
 """How a flight is reached from outside: its ports, the key of its signatures, its live picture, its live page."""
 
+from contextlib import ExitStack
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from autopilot.mavlink.transport.links import GIVE_WAY_US, LinkError, LinkRole, LinkSource
@@ -15,7 +17,9 @@ from mission.video.mjpeg_server import StreamServer
 from mission.video.rtp_video import PORT, RtpVideo, VideoError
 
 if TYPE_CHECKING:
+    from mission.foxglove.outputs import FoxgloveOutputs
     from mission.view.page import PageServer
+
 GROUND_PORT_STEP = 18570 - 14550  # from a client's port to the vehicle's own: PX4's where the client's is PX4's
 API_PORT_STEP = 14580 - 14540
 TCP_PORT_STEP = 10  # ArduPilot's, from one vehicle to the next; PX4's UDP ports are one apart
@@ -129,6 +133,24 @@ def open_images(options: FlightOptions) -> ImageServer | None:
         return ImageServer(options.image_port)
     except LinkError as error:
         raise UserError(f"--image-port {options.image_port}: {error}") from error
+
+
+def open_foxglove(options: FlightOptions, held: ExitStack) -> "FoxgloveOutputs | None":
+    """What shows the flight in Foxglove, if that is asked for; it is closed with what is held until the end."""
+    if not (options.has_mcap or options.has_foxglove):
+        return None
+    flag = "--mcap" if options.has_mcap else "--foxglove"
+    if find_spec("foxglove") is None:
+        raise UserError(f"{flag}: comes with the extra 'foxglove' (docs/start/installing.md)")
+    from mission.foxglove.outputs import FoxgloveOutputs
+
+    port = options.foxglove_port if options.has_foxglove else None
+    try:
+        outputs = FoxgloveOutputs(has_file=options.has_mcap, port=port)
+    except OSError as error:
+        raise UserError(f"--foxglove-port {port}: {error.strerror}") from error
+    held.callback(outputs.close)
+    return outputs
 
 
 def open_page(port: int) -> "PageServer":

@@ -25,6 +25,7 @@ from mission.run_folder import OwnFiles
 from mission.view.replay_file import keep_for_replay
 
 if TYPE_CHECKING:
+    from mission.foxglove.outputs import FoxgloveOutputs
     from mission.view.page import PageServer
     from mission.view.pose_goals import PoseGoals
 
@@ -42,6 +43,7 @@ class FlightSession:
         action: what a policy on board chose last.
         score: lines about it on the live page.
         goals: where the page can send its companion.
+        foxglove: what else shows it.
     """
 
     def __init__(
@@ -56,10 +58,16 @@ class FlightSession:
         action: Callable[[], Any] = lambda: None,
         score: Callable[[], tuple[str, ...]] = tuple,
         goals: "PoseGoals | None" = None,
+        foxglove: "FoxgloveOutputs | None" = None,
     ) -> None:
         self.files = OwnFiles(folder, console)
         self._flight, self._speed, self._folder, self._console = flight, speed, folder, console
         keep_for_replay(flight, path_ned, action)
+        self._foxglove = foxglove
+        if foxglove is not None:
+            foxglove.begin(flight, folder, path_ned, has_camera_thread=speed is not None)
+            if foxglove.url:
+                print_line(console, f"Foxglove connects to: {foxglove.url}")
         self._view = None
         if page is not None:
             from mission.view.live import LiveView
@@ -79,10 +87,13 @@ class FlightSession:
             running: the script that flies it, for the line of progress.
             watchers: called after each frame.
         """
-        watching = [*watchers] if self._view is None else [*watchers, self._view.frame]
+        shown = [each.frame for each in (self._foxglove, self._view) if each is not None]
+        watching = [*watchers, *shown]
         self._advance(is_over, watching, Progress(self._flight, running))
         if self._view is not None:
             self._view.end(f"flight ended: logs in {self._folder}")
+        if self._foxglove is not None:
+            self._foxglove.close()
         history = self._flight.close()  # before what takes long: who is to stop may be killed soon
         for trouble in self._flight.troubles.take():
             print_line(self._console, trouble)

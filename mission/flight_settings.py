@@ -106,6 +106,9 @@ class FlightOptions(FlightSettings):
     )
     has_view: bool = option(False, "Show the flight on a live page in the browser.", "--view")
     view_port: int = option(8080, "HTTP port of the live page.", ge=1, le=65535)
+    has_mcap: bool = option(False, "Also write flight.mcap, which Foxglove opens.", "--mcap")
+    has_foxglove: bool = option(False, "Show the flight in Foxglove while it is flown.", "--foxglove")
+    foxglove_port: int = option(8765, "Port that Foxglove connects to.", ge=1, le=65535)
     owner: str | None = option(None, "Somebody with a phone walks through the world: walk or run; see companion.")
     image_port: int = option(14600, "TCP port of the pictures for a companion, with an owner.", ge=1, le=65535)
     parameters: tuple[str, ...] = option(
@@ -143,7 +146,8 @@ class FollowOptions(FlightOptions):
 FOLLOWED_WITH = (
     "policy", "owner", "seconds", "speed", "seed", "wind_m_s", "wind_from_deg", "noise", "world_seed", "trees_per_ha",
     "hill_height_m", "airframe", "dialect", "engine", "board", "command", "instance", "parameters", "has_guard",
-    "has_view", "view_port", "has_film", "gcs_port", "api_port", "host", "run_folder",
+    "has_view", "view_port", "has_film", "has_mcap", "has_foxglove", "foxglove_port", "gcs_port", "api_port", "host",
+    "run_folder",
 )  # fmt: skip
 
 
@@ -163,6 +167,6 @@ class ParkOptions(FlightOptions):
 
 PARKED_WITH = (
     "policy", "spot", "is_reverse", "is_idle", "speed", "seconds", "seed", "wind_m_s", "wind_from_deg", "noise",
-    "world_seed", "airframe", "parameters", "has_guard", "has_view", "view_port", "gcs_port", "api_port", "host",
-    "run_folder",
+    "world_seed", "airframe", "parameters", "has_guard", "has_view", "view_port", "has_mcap", "has_foxglove",
+    "foxglove_port", "gcs_port", "api_port", "host", "run_folder",
 )  # fmt: skip

@@ -21,6 +21,7 @@ from mission.run_folder import OwnFiles
 from mission.script import fly_plan
 
 if TYPE_CHECKING:
+    from mission.foxglove.outputs import FoxgloveOutputs
     from mission.view.page import PageServer
 
 
@@ -32,11 +33,13 @@ def fly_to_the_end(
     page: "PageServer | None",
     folder: Path,
     console: Console,
+    foxglove: "FoxgloveOutputs | None" = None,
 ) -> int:
     """Flies the plan, or waits for ground stations; writes the run folder and returns the exit code."""
     path_ned = [] if plan is None else planned_path(plan, flight.config.home, flight.config.start_ne_m)
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
-    session = FlightSession(flight, speed, page, folder, console, path_ned=[point for _, point in path_ned])
+    way_ned = [point for _, point in path_ned]
+    session = FlightSession(flight, speed, page, folder, console, path_ned=way_ned, foxglove=foxglove)
     history = session.fly(end_of(options, speed, [] if running is None else [running]), running)
     exit_code = _finish(flight, history, running, plan, path_ned, folder, session.files, console)
     session.close()

@@ -14,7 +14,15 @@ from common.files import write_whole
 from common.geodesy import GeoPoint
 from common.state_folder import StateFolder
 from mission.boards.board_options import check_board, commands_of
-from mission.connections import open_images, open_links, open_page, open_stream, open_video, signing_config
+from mission.connections import (
+    open_foxglove,
+    open_images,
+    open_links,
+    open_page,
+    open_stream,
+    open_video,
+    signing_config,
+)
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import loading, print_line
 from mission.flight_options import flight_config
@@ -63,6 +71,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
     config = flight_config(options, state)
     plan = None if options.is_idle else _plan(options.plan, options.airframe, config.home)
     signing = signing_config(options, speed, state)
+    foxglove = open_foxglove(options, held)
     links = [] if speed is None else open_links(options, speed)
     stream = open_stream(options.stream_port)
     is_reached = speed is not None and not options.stream_port  # stations are told of one stream
@@ -81,7 +90,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
             import mission.follow.onboard_camera
             import mission.follow.owner_device  # noqa: F401  (their kernels are loaded with the others)
 
-        has_camera = speed is not None or stream is not None or page is not None
+        has_camera = speed is not None or any(shown is not None for shown in (stream, page, foxglove))
         load_kernels(say, config, has_camera=has_camera)
         say("building the world")
         make_flight: Callable[..., Flight] = Flight
@@ -113,7 +122,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
     if run is not None:
         run.start(flight)
     try:
-        return fly_to_the_end(flight, plan, options, speed, page, folder, console)
+        return fly_to_the_end(flight, plan, options, speed, page, folder, console, foxglove)
     finally:
         if images is not None:
             images.close()

@@ -36,9 +36,10 @@ def new_token() -> str:
 
 def browser_refusal(headers: Headers) -> str:
     """Why a request is refused that another website's page may have made; "" if it is not."""
+    refusal = host_refusal(headers)
+    if refusal:
+        return refusal
     hosts = headers.get_all("Host") or ()
-    if len(hosts) != 1 or _name(hosts[0]) not in _OWN_NAMES:
-        return "Host: not this machine"
     if any(origin.lower() != f"http://{hosts[0].lower()}" for origin in headers.get_all("Origin") or ()):
         return "Origin: another website"
     sites, modes = headers.get_all("Sec-Fetch-Site") or (), headers.get_all("Sec-Fetch-Mode") or ()
@@ -46,6 +47,12 @@ def browser_refusal(headers: Headers) -> str:
     if any(site.lower() not in ("same-origin", "none") for site in sites) and not has_followed_a_link:
         return "Sec-Fetch-Site: another website"
     return ""
+
+
+def host_refusal(headers: Headers) -> str:
+    """Why a request is refused that was not sent to this machine by its name; "" if it is not."""
+    hosts = headers.get_all("Host") or ()
+    return "" if len(hosts) == 1 and _name(hosts[0]) in _OWN_NAMES else "Host: not this machine"
 
 
 def _name(host: str) -> str:

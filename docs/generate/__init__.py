@@ -9,6 +9,7 @@ from autopilot.mavlink.dialects.ardupilot_aliases import ALIASES, CONSTANTS
 from autopilot.params import parameter_sections, parameter_table
 from common.airframe import load_airframe
 from common.params import Parameter
+from docs.generate.foxglove_page import foxglove_text
 from docs.generate.mavlink_page import mavlink_text
 from docs.generate.tasks_page import tasks_text
 from docs.generate.training_page import training_text
@@ -112,6 +113,7 @@ def generated_pages() -> dict[Path, str]:
         REFERENCE / "scenario.schema.json": schema_text(),
         REFERENCE / "campaign-keys.md": campaign_schema.reference_text(),
         REFERENCE / "campaign.schema.json": campaign_schema.schema_text(),
+        REFERENCE / "foxglove-channels.md": foxglove_text(),
     }
 
 

@@ -14,7 +14,7 @@ from autopilot.mavlink.transport.links import LinkError, LinkSource
 from mission.boards.board_options import check_board, commands_of
 from mission.boards.process import PeerProcess
 from mission.boards.watch import Watch, filled_in
-from mission.connections import open_images, open_links, open_page
+from mission.connections import open_foxglove, open_images, open_links, open_page
 from mission.console.option_checks import UserError
 from mission.console.terminal import Say, loading, print_line
 from mission.flight_config import FlightConfig
@@ -145,6 +145,7 @@ def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, he
     console = Console()
     config = flight_config(options, None)
     check_ports(options.board, options.instance)
+    foxglove = open_foxglove(options, held)
     links = station_links(options, speed)
     images = open_images(options)
     page = open_page(options.view_port) if options.has_view else None
@@ -169,7 +170,7 @@ def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, he
     if page is not None:
         print_line(console, f"live page: {page.url}")
     run.start(flight)
-    return fly_to_the_end(flight, plan, options, speed, page, folder, console)
+    return fly_to_the_end(flight, plan, options, speed, page, folder, console, foxglove)
 
 
 def check_ports(board: str, instance: int) -> None:

@@ -66,6 +66,8 @@ def check_fleet(options: FlightOptions) -> None:
         "--stream-port": options.stream_port != 0,
         "--video-port": bool(options.video_port),
         "--instance": options.instance != 0,
+        "--mcap": options.has_mcap,
+        "--foxglove": options.has_foxglove,
     }
     for name, is_given in alone.items():
         if is_given:

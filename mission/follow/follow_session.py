@@ -24,7 +24,7 @@ from common.params import ParameterError
 from mission.boards.board_options import check_board, commands_of
 from mission.boards.board_runs import run_of
 from mission.boards.board_session import station_links
-from mission.connections import open_links, open_page
+from mission.connections import open_foxglove, open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
 from mission.flight import Flight, flight_parameters
@@ -75,6 +75,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     speed = speed_of(options.speed)
     pilot, name = chosen_pilot(options)
     config = follow_config(options, has_scanner=isinstance(pilot, NavigationPilot))
+    foxglove = open_foxglove(options, held)
     links = _links(options, config, speed)
     page = open_page(options.view_port) if options.has_view else None
     folder = held.enter_context(run_folder(options.run_folder))
@@ -104,6 +105,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         console,
         action=lambda: companion.action,
         score=lambda: score_lines(watch, companion),
+        foxglove=foxglove,
     )
     running = flight.drone.start(follow(flight.drone, companion, options.seconds))
     where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.gcs_port}"

@@ -17,7 +17,7 @@ from autopilot.mavlink.transport.links import LinkError
 from common.airframe import load_airframe
 from common.files import write_whole
 from mission.client import Running
-from mission.connections import open_links, open_page
+from mission.connections import open_foxglove, open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
 from mission.flight import Flight
@@ -76,8 +76,10 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
     config = park_config(options)
     pilot = _pilot(options.policy)
     with busy(console, "loading kernels") as say:
-        load_kernels(say, config, has_camera=options.has_view, others=PARKING)
+        has_camera = options.has_view or options.has_mcap or options.has_foxglove
+        load_kernels(say, config, has_camera=has_camera, others=PARKING)
         spot = chosen_spot(spots_of(flight_world(config)), options)
+    foxglove = open_foxglove(options, held)
     try:
         links = [] if speed is None else open_links(options, speed)
     except LinkError as error:
@@ -94,7 +96,8 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
             arrivals.append(await drive(drone, flight, companion, pose_in(spot, is_reverse=options.is_reverse)))
 
     goals = _goals(flight, companion, is_reverse=options.is_reverse)
-    session = FlightSession(flight, speed, page, folder, console, score=lambda: (_state(companion),), goals=goals)
+    score = lambda: (_state(companion),)  # noqa: E731
+    session = FlightSession(flight, speed, page, folder, console, score=score, goals=goals, foxglove=foxglove)
     running = flight.drone.start(script(flight.drone))
     where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.gcs_port}"
     aim = f"drives into spot {spot.number}" if spot is not None else "waits for a goto"

@@ -130,8 +130,8 @@ def _load_one(folder: Path) -> Recording:
             f"{parts[-1]}: is no log of this version's honeyguide fly or follow: show it with the version that wrote it"
         )
     try:
-        config = FlightConfig.model_validate(json.loads(_info(logs[-1], CONFIG_KEY)))
-        path_ned = np.array(json.loads(_info(logs[-1], PATH_KEY)), np.float32).reshape(-1, 3)
+        config = FlightConfig.model_validate(json.loads(info_text(logs[-1], CONFIG_KEY)))
+        path_ned = np.array(json.loads(info_text(logs[-1], PATH_KEY)), np.float32).reshape(-1, 3)
         rows = np.concatenate([_rows(log) for log in logs])
     except (KeyError, ValueError) as error:
         raise RecordingError(f"{parts[-1]}: cannot be shown: damaged, or of another version") from error
@@ -148,7 +148,7 @@ def _part_number(path: Path) -> int:
     return int(number) if number.isdecimal() else 0
 
 
-def _info(log: ULog, key: str) -> str:
+def info_text(log: ULog, key: str) -> str:
     return "".join(log.msg_info_multiple_dict[key][0])
 
 

@@ -43,6 +43,7 @@ RUN_BY_OTHERS = (
     ),  # tests/unit/mission/train/test_task_commands.py
     f"{HONEYGUIDE} world ",  # tests/unit/mission/world
     f"{HONEYGUIDE} fly --world ",  # tests/unit/mission/world/test_worked_example.py
+    f"{HONEYGUIDE} mcap ",  # tests/system/commands/test_foxglove.py
     f"{HONEYGUIDE} replay ",  # tests/unit/mission/view/test_replay.py
     f"{HONEYGUIDE} review ",  # tests/unit/mission/review/test_review_session.py
     f"{HONEYGUIDE} benchmark ",  # tests/unit/mission/follow/test_benchmark.py
@@ -193,6 +194,8 @@ def test_command_works(page, line, tmp_path, monkeypatch):
     shortened = [] if is_whole else ["--speed", "max", "--seconds", "5"]  # the last one of an option counts
     if "--view" in arguments:
         shortened += ["--view-port", str(free_port())]
+    if "--foxglove" in arguments:
+        shortened += ["--foxglove-port", str(free_port())]
     result = CliRunner().invoke(app, ["fly", *arguments, *shortened, "--run-folder", str(tmp_path / "flight")])
     is_idle = "--idle" in arguments
     assert result.exit_code == (0 if is_whole or is_idle else 1), result.output  # 1: shortened before its end

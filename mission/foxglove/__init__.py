@@ -1,0 +1,1 @@
+"""Flights as Foxglove shows them: MCAP files, and a live connection."""
