@@ -7,8 +7,8 @@ HEADER = """\
 
 Written by `python -m docs.generate` from the code: do not edit.
 
-What [`--mcap`, `--foxglove` and `honeyguide mcap`](../how-to/foxglove.md) tell. Schemas `foxglove.*` are Foxglove's,
-as protobuf; the others are JSON objects with a JSON schema. Rates are the most there is, in simulated time.
+What [`--mcap`, `--foxglove` and `honeyguide mcap`](../how-to/foxglove.md) tell. Schemas `foxglove.*` are its own, as
+protobuf; the others are JSON objects with a JSON schema. Rates are the most there is, in simulated time.
 
 | topic | schema | rate | what it tells |
 |---|---|---|---|
