@@ -81,7 +81,7 @@ def parse_scenario(text: str, file: str, folder: Path) -> Scenario:
         raise UserError(notes[0])
     if not root.get("name"):
         root.put("name", Path(file).name.removesuffix(SUFFIX))
-    _resolve(root, folder.resolve())
+    resolve_paths(root, folder.resolve())
     try:
         return Scenario.model_validate(root)
     except ValidationError as error:
@@ -96,7 +96,7 @@ def _fault(error: ValidationError, root: Located) -> str:
     return f"{location}: {key}: {text}" if key else f"{location}: {text}"
 
 
-def _resolve(root: Located, folder: Path) -> None:
+def resolve_paths(root: dict[str, Any], folder: Path) -> None:
     """Makes paths absolute, as far as the file has the form that it should."""
     for vehicle in [root.get("vehicle"), *_mappings(root.get("vehicles"))]:
         if isinstance(vehicle, dict):
@@ -117,7 +117,7 @@ def _resolve(root: Located, folder: Path) -> None:
 
 
 def _mappings(value: Any) -> list[dict[str, Any]]:
-    return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
+    return [each for each in value if isinstance(each, dict)] if isinstance(value, list | tuple) else []
 
 
 def _absolute(mapping: dict[str, Any], key: str, folder: Path) -> None:
