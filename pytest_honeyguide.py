@@ -20,6 +20,8 @@ MARKER = "honeyguide"
 FLIGHT, CHOICE = "_honeyguide_flight", "_honeyguide_choice"  # fixtures behind those that tests ask for
 COROUTINE = pytest.StashKey[Any]()
 """The function of a test that flies, as its author wrote it: other plugins may wrap it."""
+TOLD = pytest.StashKey[str]()
+"""What is shown of the flight of a test that failed."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -72,6 +74,33 @@ def pytest_itemcollected(item: pytest.Item) -> None:
         item.stash[COROUTINE] = item.function
 
 
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_fixture_setup(fixturedef: Any, request: pytest.FixtureRequest) -> Generator[None, Any, Any]:
+    """Runs an `async def` fixture that asks for a vehicle in the vehicle's time."""
+    own = fixturedef.func
+    if not (inspect.iscoroutinefunction(own) or inspect.isasyncgenfunction(own)) or not _flies(fixturedef, request):
+        return (yield)
+    from mission.pytest_plugin.running import flown_fixture
+
+    fixturedef.func = flown_fixture(own, request)
+    try:
+        return (yield)
+    finally:
+        fixturedef.func = own
+
+
+def _flies(fixturedef: Any, request: pytest.FixtureRequest) -> bool:
+    """Whether a fixture asks for a vehicle, or for one that does."""
+    known = request.node._fixtureinfo.name2fixturedefs if isinstance(request.node, pytest.Function) else {}
+    found, left = set(), list(fixturedef.argnames)
+    while left:
+        name = left.pop()
+        if name not in found:
+            found.add(name)
+            left += [each for definition in known.get(name, ()) for each in definition.argnames]
+    return FLIGHT in found
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     """Flies a test that asks for a vehicle."""
@@ -89,12 +118,8 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Shows the flight of a test that failed."""
     report = yield
-    if COROUTINE in item.stash and report.failed:
-        from mission.pytest_plugin.running import TOLD
-
-        told = item.stash.get(TOLD, "")
-        if told:
-            report.sections.append(("flight", told))
+    if COROUTINE in item.stash and report.failed and report.when != "teardown" and item.stash.get(TOLD, ""):
+        report.sections.append(("flight", item.stash[TOLD]))
     return report
 
 

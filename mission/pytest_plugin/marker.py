@@ -95,11 +95,11 @@ def scenario_of(item: pytest.Item, choice: Keys) -> tuple[Scenario, int]:
     Raises:
         MarkerError: it says something that is wrong.
     """
-    given = {key: value for key, value in given_keys(item).items() if key not in SEVERAL} | dict(choice)
+    given = {key: _plain(value) for key, value in given_keys(item).items() if key not in SEVERAL}
+    given |= {key: _plain(value) for key, value in choice.items()}
     seed = given.pop("seed", 1)
     if not isinstance(seed, int) or not 0 <= seed <= SEED_MAX:
         raise MarkerError(f"{_at(item)}: seed: must be a whole number from 0, not {seed!r}")
-    root: dict[str, Any] = {}
     own = {key: given.pop(key) for key in list(given) if key in Vehicle.model_fields}
     if own and given.keys() & {"vehicle", "vehicles"}:
         raise MarkerError(f"{_at(item)}: {', '.join(own)}: is of a vehicle, write it there")
@@ -120,6 +120,15 @@ def scenario_of(item: pytest.Item, choice: Keys) -> tuple[Scenario, int]:
             "checks": tuple(part_of(Check, check, f"checks[{i}]") for i, check in enumerate(checks)),
         }
     ), seed
+
+
+def _plain(value: Any) -> Any:
+    """A value as a file would have it; a copy."""
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 def part_of(model: type[Entry], given: Any, name: str) -> Entry:

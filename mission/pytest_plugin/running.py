@@ -21,9 +21,9 @@ from mission.pytest_plugin.refusal import refused
 from mission.pytest_plugin.tested_flight import LockstepFlight, TestedFlight
 from mission.scenario.flight.building import check_scenario
 from mission.scenario.keeping import emptied
+from mission.scenario.result import ScenarioResult
+from pytest_honeyguide import TOLD
 
-TOLD = pytest.StashKey[str]()
-"""What is shown of the flight of a test that failed."""
 _FLIGHT = pytest.StashKey[TestedFlight]()
 _NAME_MAX = 150  # of a folder [characters]
 
@@ -45,26 +45,55 @@ def prepared_flight(item: pytest.Function, choice: Mapping[str, Any]) -> TestedF
     return flight
 
 
+def flown_fixture(function: Callable[..., Any], request: pytest.FixtureRequest) -> Callable[..., Any]:
+    """A fixture's coroutine, as a function that runs it in the vehicle's time."""
+    item = request.node
+    if inspect.isasyncgenfunction(function):
+        pytest.fail(
+            f"{item.nodeid}: the fixture {request.fixturename} flies and yields; the flight is over with the test, so "
+            "that it can only return",
+            pytrace=False,
+        )
+    owner = getattr(function, "__self__", None)
+    if owner is not None and isinstance(request.instance, type(owner)):
+        function = function.__func__.__get__(request.instance)  # type: ignore[attr-defined]
+
+    def flown(**given: Any) -> Any:
+        __tracebackhide__ = True
+        try:
+            return item.stash[_FLIGHT].run(function(**given))
+        except BaseException as raised:
+            _end(item, raised)
+            raise _without_ours(raised) from None
+
+    return flown
+
+
 def fly_test(item: pytest.Function, function: Callable[..., Any], given: Mapping[str, Any]) -> None:
     """Runs a test in its vehicle's time, and judges its flight."""
     __tracebackhide__ = True
     flight = item.stash[_FLIGHT]
-    del item.stash[_FLIGHT]
-    error: BaseException | None = None
     try:
         flight.run(function(**given))
         flight.finish_orders()
     except BaseException as raised:
-        error = raised
+        _end(item, raised)
+        raise _without_ours(raised) from None
+    result = _end(item, None)
+    if not result.passed:
+        pytest.fail("\n".join(result.failures), pytrace=False)
+
+
+def _end(item: pytest.Function, error: BaseException | None) -> ScenarioResult:
+    """Ends the flight, and notes what is shown of it."""
+    flight = item.stash[_FLIGHT]
+    del item.stash[_FLIGHT]
     result = flight.end(_said(error))
     item.stash[TOLD] = flight_text(result, flight.scenario, _again(item))
-    has_failed = not result.passed and not isinstance(error, pytest.skip.Exception)
-    if result.folder and not (has_failed or item.config.getoption("honeyguide_keep_all")):
+    is_good = isinstance(error, pytest.skip.Exception) or result.passed
+    if result.folder and is_good and not item.config.getoption("honeyguide_keep_all"):
         shutil.rmtree(result.folder)
-    if error is not None:
-        raise _without_ours(error) if isinstance(error, ScriptError) else error
-    if has_failed:
-        pytest.fail("\n".join(result.failures), pytrace=False)
+    return result
 
 
 def _said(error: BaseException | None) -> str:
@@ -73,11 +102,11 @@ def _said(error: BaseException | None) -> str:
     return str(error) if isinstance(error, ScriptError) else f"{type(error).__name__}: {error}"
 
 
-def _without_ours(error: ScriptError) -> ScriptError:
-    """With a traceback that ends where the test, or what it calls, has called us."""
+def _without_ours(error: BaseException) -> BaseException:
+    """An error of a script with a traceback that ends where the test, or what it calls, has called us."""
     own = str(Path(__file__).parents[1])
     kept, trace = None, error.__traceback__
-    while trace is not None:
+    while trace is not None and isinstance(error, ScriptError):
         if not trace.tb_frame.f_code.co_filename.startswith(own):
             kept = trace
         trace = trace.tb_next

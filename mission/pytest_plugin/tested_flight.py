@@ -1,12 +1,14 @@
 """The flight of a test: what the fixture `flight` is. Here in lockstep, in memory."""
 
+import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Coroutine
 from pathlib import Path
 from typing import Any
 
 from common.attitude import Vector
-from mission.client import ScriptError
+from mission.client import ScriptTimeout
+from mission.console.option_checks import UserError
 from mission.pytest_plugin.marker import part_of
 from mission.scenario.parts.checks import Check
 from mission.scenario.parts.faults import Fault
@@ -21,16 +23,30 @@ class Kept:
 
     def __init__(self, coroutine: Coroutine[Any, Any, Any]) -> None:
         self._coroutine = coroutine
-        self.result: Any = None
-        self.error: BaseException | None = None
+        self._result: Any = None
+        self._error: BaseException | None = None
 
     async def run(self) -> None:
         try:
-            self.result = await self._coroutine
+            self._result = await self._coroutine
         except GeneratorExit:
             raise
         except BaseException as error:
-            self.error = error
+            self._error = error
+
+    def give_up(self, reason: str) -> None:
+        """Ends it where it waits, with an error that says why."""
+        self._error = ScriptTimeout(reason)
+        try:
+            self._coroutine.throw(self._error)
+        except BaseException as error:
+            self._error = error if error is self._error else ScriptTimeout(reason)
+
+    def outcome(self) -> Any:
+        """What it returned; or what it raised is raised."""
+        if self._error is not None:
+            raise self._error
+        return self._result
 
 
 class TestedFlight(ABC):
@@ -83,8 +99,12 @@ class LockstepFlight(TestedFlight):
     __test__ = False
 
     def __init__(self, scenario: Scenario, seed: int, folder: Path | None, file: str) -> None:
-        self._under_way = UnderWay(scenario, seed, folder)
-        self._file, self._is_over = file, False
+        self._folder, self._file, self._is_over = folder, file, False
+        try:
+            self._under_way = UnderWay(scenario, seed, folder)
+        except UserError:
+            self._forget_logs()
+            raise
         self._run = self._under_way.run
         self.scenario, self.seed = scenario, seed
         self.fleet = self._run.drones
@@ -132,12 +152,10 @@ class LockstepFlight(TestedFlight):
         running = self.fleet[0].start(kept.run())
         self._under_way.fly(lambda: running.is_done)
         if not running.is_done:
+            lost = self._run.vehicles[0].flight.end_reason
+            kept.give_up(lost or f"not done after {self.time_s:g} s of simulated time (time_max_s)")
             running.cancel()
-            vehicle = self._run.vehicles[0].flight
-            raise ScriptError(vehicle.end_reason or f"not done after {self.time_s:g} s of simulated time (time_max_s)")
-        if kept.error is not None:
-            raise kept.error
-        return kept.result
+        return kept.outcome()
 
     def finish_orders(self) -> None:
         if any(vehicle.running is not None for vehicle in self._run.vehicles):
@@ -151,3 +169,8 @@ class LockstepFlight(TestedFlight):
         if not self._is_over:
             self._is_over = True
             self._under_way.give_up()
+            self._forget_logs()
+
+    def _forget_logs(self) -> None:
+        if self._folder is not None:
+            shutil.rmtree(self._folder)

@@ -117,7 +117,7 @@ def resolve_paths(root: dict[str, Any], folder: Path) -> None:
 
 
 def _mappings(value: Any) -> list[dict[str, Any]]:
-    return [each for each in value if isinstance(each, dict)] if isinstance(value, list | tuple) else []
+    return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
 
 
 def _absolute(mapping: dict[str, Any], key: str, folder: Path) -> None:
