@@ -4,36 +4,27 @@ import shlex
 from math import isfinite
 
 from mission.scenario.result import CheckResult, ScenarioResult
-from mission.scenario.scenario import Scenario
 
 TEXTS_MAX = 8
 
 
-def flight_text(result: ScenarioResult, scenario: Scenario, again: str) -> str:
+def flight_text(result: ScenarioResult, title: str, again: str) -> str:
     """The text.
 
     Args:
         result: of the flight.
-        scenario: what was flown.
+        title: who flew, where, and how long.
         again: the command that flies it again.
     """
-    lines = [_title(result, scenario)]
+    lines = [title]
     if result.error:
-        lines.append(f"ended at {result.simulated_s:.1f} s of simulated time: {result.error.splitlines()[0]}")
+        lines.append(f"ended at {result.simulated_s:.1f} s: {result.error.splitlines()[0]}")
     lines += [_check_line(check) for check in result.checks]
     lines += _heard(result)
     lines.append(f"again: {again}")
     if result.folder:
         lines.append(f"kept in {result.folder}; see it: honeyguide replay {shlex.quote(result.folder)}")
     return "\n".join(lines)
-
-
-def _title(result: ScenarioResult, scenario: Scenario) -> str:
-    fleet = [vehicle.airframe for vehicle in scenario.fleet]
-    who = f"{len(fleet)} x {fleet[0]}" if len(fleet) > 1 and len(set(fleet)) == 1 else ", ".join(fleet)
-    world = scenario.world.file or scenario.world.kind
-    wind = f", wind {scenario.wind.speed_m_s:g} m/s" if scenario.wind.speed_m_s else ""
-    return f"{who} in the world {world}{wind}, seed {result.seed}, {result.simulated_s:.1f} s flown"
 
 
 def _check_line(check: CheckResult) -> str:

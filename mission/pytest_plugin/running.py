@@ -22,6 +22,7 @@ from mission.pytest_plugin.tested_flight import LockstepFlight, TestedFlight
 from mission.scenario.flight.building import check_scenario
 from mission.scenario.keeping import emptied
 from mission.scenario.result import ScenarioResult
+from mission.scenario.scenario import Scenario
 from pytest_honeyguide import TOLD
 
 _FLIGHT = pytest.StashKey[TestedFlight]()
@@ -40,9 +41,18 @@ def prepared_flight(item: pytest.Function, choice: Mapping[str, Any]) -> TestedF
     with refused(place):
         scenario, seed = scenario_of(item, choice)
         check_scenario(scenario, place)
-        flight = LockstepFlight(scenario, seed, _folder(item), str(item.path))
+        flight = _flight(item, scenario, seed)
     item.stash[_FLIGHT] = flight
     return flight
+
+
+def _flight(item: pytest.Function, scenario: Scenario, seed: int) -> TestedFlight:
+    link = item.config.getoption("link")
+    if not link:
+        return LockstepFlight(scenario, seed, _folder(item), str(item.path))
+    from mission.pytest_plugin.linked_flight import LinkedFlight
+
+    return LinkedFlight(link, scenario, str(item.path))
 
 
 def flown_fixture(function: Callable[..., Any], request: pytest.FixtureRequest) -> Callable[..., Any]:
@@ -89,7 +99,7 @@ def _end(item: pytest.Function, error: BaseException | None) -> ScenarioResult:
     flight = item.stash[_FLIGHT]
     del item.stash[_FLIGHT]
     result = flight.end(_said(error))
-    item.stash[TOLD] = flight_text(result, flight.scenario, _again(item))
+    item.stash[TOLD] = flight_text(result, flight.title, _again(item))
     is_good = isinstance(error, pytest.skip.Exception) or result.passed
     if result.folder and is_good and not item.config.getoption("honeyguide_keep_all"):
         shutil.rmtree(result.folder)

@@ -1,20 +1,25 @@
-"""Scenario files as tests: each is collected with one item per seed, flown as `honeyguide test` flies it."""
+"""Scenario files as tests: each is collected with one item per seed, flown as `honeyguide test` flies it.
+
+Light to import: pytest may ask for the collector of a file that is not to be run.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from mission.pytest_plugin.refusal import refused
-from mission.scenario.scenario import Scenario
-from mission.scenario.scenario_file import read_scenario
+if TYPE_CHECKING:
+    from mission.scenario.scenario import Scenario
 
 
 class ScenarioFileCollector(pytest.File):
     """A scenario file."""
 
     def collect(self) -> Iterator[pytest.Item]:
+        from mission.pytest_plugin.refusal import refused
+        from mission.scenario.scenario_file import read_scenario
+
         with refused():
             scenario = read_scenario(self.path)
         for seed in scenario.seeds:
@@ -28,7 +33,7 @@ class ScenarioFailed(Exception):
 class ScenarioItem(pytest.Item):
     """One run of a scenario."""
 
-    def __init__(self, *, scenario: Scenario, seed: int, **given: Any) -> None:
+    def __init__(self, *, scenario: "Scenario", seed: int, **given: Any) -> None:
         super().__init__(**given)
         self._scenario, self._seed = scenario, seed
 

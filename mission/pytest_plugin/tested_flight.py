@@ -58,6 +58,11 @@ class TestedFlight(ABC):
     scenario: Scenario
     world: Any
 
+    @property
+    @abstractmethod
+    def title(self) -> str:
+        """Who flew, where, and how long."""
+
     @abstractmethod
     def check(self, check: Check | None = None, **keys: Any) -> None:
         """Asks something of this flight, which is judged at its end: `flight.check(tilt={"max": 30}, from_="up")`."""
@@ -110,6 +115,14 @@ class LockstepFlight(TestedFlight):
         self.fleet = self._run.drones
         self.world = self._run.vehicles[0].flight.world
         self._under_way.start()
+
+    @property
+    def title(self) -> str:
+        scenario, fleet = self.scenario, [vehicle.airframe for vehicle in self.scenario.fleet]
+        who = f"{len(fleet)} x {fleet[0]}" if len(fleet) > 1 and len(set(fleet)) == 1 else ", ".join(fleet)
+        wind = f", wind {scenario.wind.speed_m_s:g} m/s" if scenario.wind.speed_m_s else ""
+        world = scenario.world.file or scenario.world.kind
+        return f"{who} in the world {world}{wind}, seed {self.seed}, {self.time_s:.1f} s flown"
 
     @property
     def time_s(self) -> float:
