@@ -96,7 +96,7 @@ def _value(schema: dict[str, Any]) -> str:
             return f"{len(schema['prefixItems'])} numbers"
         return f"list of {_value(schema['items'])}"
     if schema.get("type") == "object":
-        return "numbers by name"
+        return "bounds by name" if "propertyNames" in schema else "numbers by name"
     return _TYPES.get(schema.get("type", ""), "") + _bounds(schema)
 
 
