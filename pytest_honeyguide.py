@@ -51,6 +51,9 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     if not file_path.name.endswith(".scenario.yaml"):
         return None
+    is_kept = (file_path.parent / "result.json").is_file()  # a run that failed: flown when it is asked for
+    if is_kept and not parent.session.isinitpath(file_path):
+        return None
     from mission.pytest_plugin.scenario_items import ScenarioFileCollector
 
     return ScenarioFileCollector.from_parent(parent, path=file_path)

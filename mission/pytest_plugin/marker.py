@@ -39,7 +39,10 @@ def given_keys(item: pytest.Item) -> Keys:
         MarkerError: one has a key that there is not, or values without a key.
     """
     found: dict[str, Any] = {}
-    for marker in reversed(list(item.iter_markers(NAME))):
+    of_parameters = [] if (spec := getattr(item, "callspec", None)) is None else spec.marks
+    markers = list(item.iter_markers(NAME))[::-1]
+    markers.sort(key=lambda marker: any(marker is each for each in of_parameters))  # the nearest of all
+    for marker in markers:
         if marker.args:
             raise MarkerError(f"{_at(item)}: takes keys only, as wind=5, not {marker.args[0]!r}")
         for key, value in marker.kwargs.items():
