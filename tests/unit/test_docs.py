@@ -41,6 +41,7 @@ RUN_BY_OTHERS = (
     *(
         f"{HONEYGUIDE} {name} " for name in ("demonstrate", "play", "drive")
     ),  # tests/unit/mission/train/test_task_commands.py
+    "pytest ",  # tests/unit/mission/pytest_plugin
     f"{HONEYGUIDE} replay ",  # tests/unit/mission/view/test_replay.py
     f"{HONEYGUIDE} benchmark ",  # tests/unit/mission/follow/test_benchmark.py
     f"{HONEYGUIDE} test ",  # tests/unit/mission/scenario/test_command.py, tests/system/scenarios

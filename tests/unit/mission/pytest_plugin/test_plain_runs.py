@@ -35,7 +35,8 @@ def test_a_plain_run_imports_one_file(pytester):
 
 
 def test_twenty_tests_cost_little_each(pytester):
-    pytester.makepyfile("""
+    pytester.makepyfile(
+        """
         import time
         import pytest
         ends = []
@@ -48,7 +49,9 @@ def test_twenty_tests_cost_little_each(pytester):
             costs = sorted(after - before for before, after in zip(ends, ends[1:]))
             print("CPU s per test: median", costs[10], "most", costs[-1], "mean", sum(costs) / 20)
             assert sum(costs) / 20 < %f
-    """ % OVERHEAD_MAX_S)
+    """
+        % OVERHEAD_MAX_S
+    )
     result = inner(pytester, "-s")
     result.assert_outcomes(passed=22)
 
