@@ -33,6 +33,7 @@ NOT_RUN_HERE = {
     ".venv/bin/python -m autopilot.estimator.derive": "tests/unit/autopilot/estimator/test_derive.py",
 }
 
+TESTS_THEMSELVES = {"docs/how-to/pytest.md"}  # run by tests/unit/mission/pytest_plugin/test_docs_example.py
 RUN_BY_OTHERS = (
     "pipx install ",
     "pip wheel ",
@@ -203,7 +204,9 @@ def test_make_targets_that_are_shown_exist():
         assert set(shown) <= targets, page
 
 
-@pytest.mark.parametrize("name", [name for name, page in PAGES.items() if blocks(page, "python")])
+@pytest.mark.parametrize(
+    "name", [name for name, page in PAGES.items() if blocks(page, "python") and name not in TESTS_THEMSELVES]
+)
 def test_examples_run(name, tmp_path, monkeypatch):
     """The blocks of a page, in order, as one program."""
     monkeypatch.chdir(tmp_path)

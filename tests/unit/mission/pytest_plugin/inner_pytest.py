@@ -1,4 +1,7 @@
-"""A pytest in this one, with the plugin as this process has it. What is imported here is not imported in each of them."""
+"""A pytest in this one, with the plugin as this process has it.
+
+What is imported here is not imported in each of them.
+"""
 
 import pytest_honeyguide
 from mission.pytest_plugin import running, scenario_items  # noqa: F401

@@ -48,9 +48,8 @@ def test_twenty_tests_cost_little_each(pytester):
         def test_cost():
             costs = sorted(after - before for before, after in zip(ends, ends[1:]))
             print("CPU s per test: median", costs[10], "most", costs[-1], "mean", sum(costs) / 20)
-            assert sum(costs) / 20 < %f
-    """
-        % OVERHEAD_MAX_S
+            assert sum(costs) / 20 < OVERHEAD_MAX_S
+    """.replace("OVERHEAD_MAX_S", str(OVERHEAD_MAX_S))
     )
     result = inner(pytester, "-s")
     result.assert_outcomes(passed=22)
