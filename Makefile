@@ -137,7 +137,7 @@ test-dronekit: $(STAMP) $(DRONEKIT)/.installed ## Fly with dronekit, in an envir
 check: $(STAMP) ## Check format, lint, types and layers, as CI does before the tests
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy $(PACKAGES)
+	$(BIN)/mypy $(PACKAGES) pytest_honeyguide.py
 	$(BIN)/lint-imports
 
 tune: $(STAMP) ## Print the designed gains with their gain, phase and disk margins

@@ -58,11 +58,20 @@ class RemoteVehicle:
         place: where it is looked for, in words.
         system_id: its own.
         silence_s: wall clock seconds without a message after which it is given up.
+        make_drone: who speaks its way.
     """
 
-    def __init__(self, link: ByteLink, place: str, *, system_id: int = 1, silence_s: float = SILENCE_S) -> None:
+    def __init__(
+        self,
+        link: ByteLink,
+        place: str,
+        *,
+        system_id: int = 1,
+        silence_s: float = SILENCE_S,
+        make_drone: type[Drone] = Drone,
+    ) -> None:
         self._link, self._place, self._silence_s = link, place, silence_s
-        self.drone = Drone(link, system_id=system_id)
+        self.drone = make_drone(link, system_id=system_id)
         self._time_us = 0  # simulated
         self._reported_us, self._boot_us = 0, 0  # the vehicle's clock, and when that began
         self._heard_s = wall_time_s()

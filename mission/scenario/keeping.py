@@ -20,7 +20,15 @@ def run_folder_of(keep: Path, scenario: Scenario, seed: int) -> Path:
     Raises:
         UserError: something else is there.
     """
-    folder = keep / f"{scenario.name}-seed{seed}"
+    return emptied(keep / f"{scenario.name}-seed{seed}")
+
+
+def emptied(folder: Path) -> Path:
+    """The folder, without what an earlier run has left there.
+
+    Raises:
+        UserError: something else is there.
+    """
     if folder.exists():
         if not (folder / RESULT_FILE).is_file():
             raise UserError(f"{folder}: is there already, and is no kept run")

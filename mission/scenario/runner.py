@@ -47,50 +47,114 @@ def run_scenario(
     Raises:
         UserError: it cannot be flown as it is: no such airframe, parameter, policy, plan or function.
     """
-    begun_s = process_time_s()
-    seed = scenario.seeds[0] if seed is None else seed
-    if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-    built = Built(scenario, seed, folder)
-    is_closed, run = False, None
+    flown = UnderWay(scenario, scenario.seeds[0] if seed is None else seed, folder)
     try:
-        run = _run_of(scenario, built)
-        faults = FaultTimeline(run, scenario.faults)
-        _start(run)
+        flown.start()
+        flown.fly(flown.is_told_done)
+    except BaseException:
+        flown.give_up()
+        raise
+    return flown.end(file)
+
+
+class UnderWay:
+    """A scenario that is being flown: built, told what to do, advanced, ended and judged.
+
+    Args:
+        scenario: what is flown.
+        seed: of noise, turbulence and the owner's path.
+        folder: where logs and the result go; None writes nothing.
+
+    Raises:
+        UserError: it cannot be flown as it is.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int, folder: Path | None) -> None:
+        self._begun_s = process_time_s()
+        self.seed, self._folder = seed, folder
         if folder is not None:
-            for vehicle in run.vehicles:
+            folder.mkdir(parents=True, exist_ok=True)
+        self._built = Built(scenario, seed, folder)
+        try:
+            self.run = _run_of(scenario, self._built)
+            self.faults = FaultTimeline(self.run, scenario.faults)
+        except BaseException:
+            self._built.close()
+            raise
+        self._over_us = self._end_us = round(scenario.time_max_s * 1e6)
+
+    def start(self) -> None:
+        """Starts what each vehicle was told to do.
+
+        Raises:
+            UserError: a plan or a function is not there.
+        """
+        _start(self.run)
+        if self._folder is not None:
+            for vehicle in self.run.vehicles:
                 keep_for_replay(vehicle.flight, _path(vehicle))
-        _fly(run, built, faults)
-        error = _error(run, faults)
+
+    def fly(self, is_over: Callable[[], bool]) -> None:
+        """Until `is_over()`, asked after each frame, or until the scenario's time is up."""
+        witnesses = [vehicle.witness for vehicle in self.run.vehicles]
+        run, faults, end_us = self.run, self.faults, self._end_us
+
+        def is_enough(flight: Any) -> bool:
+            time_us = flight.time_us
+            faults.frame(time_us)
+            if run.watch is not None:
+                run.watch.frame()
+            for witness in witnesses:
+                witness.look()
+            return is_over() or bool(time_us >= end_us)
+
+        flown: Any = self._built.flights[0] if self._built.fleet is None else self._built.fleet
+        flown.run(is_enough)
+
+    def is_told_done(self) -> bool:
+        """Whether all scripts are done, and a little more."""
+        running = [vehicle.running for vehicle in self.run.vehicles if vehicle.running is not None]
+        time_us = self.run.vehicles[0].flight.time_us
+        if self._over_us == self._end_us and running and all(each.is_done for each in running):
+            self._over_us = min(time_us + round(AFTER_S * 1e6), self._end_us - 1)
+        return bool(time_us >= self._over_us)
+
+    def give_up(self) -> None:
+        """Ends it without a result."""
+        for vehicle in self.run.vehicles:
+            if vehicle.running is not None:
+                vehicle.running.cancel()
+        self._built.close()
+
+    def end(self, file: str = "", error: str = "") -> ScenarioResult:
+        """Ends it, and judges it.
+
+        Args:
+            file: where the scenario came from.
+            error: why it did not come to its end, besides what its scripts say.
+        """
+        run, folder = self.run, self._folder
+        error = error or _error(run, self.faults)
         simulated_s = run.time_s
-        is_closed = True
-        histories = built.close()
-    finally:
-        if not is_closed:
-            for vehicle in () if run is None else run.vehicles:
-                if vehicle.running is not None:
-                    vehicle.running.cancel()
-            built.close()
-    checks = judge(run, histories, simulated_s)
-    result = ScenarioResult(
-        name=scenario.name or "scenario",
-        file=file,
-        seed=seed,
-        checks=checks,
-        error=error,
-        simulated_s=simulated_s,
-        cpu_s=process_time_s() - begun_s,
-        texts=tuple(
-            sorted((time_s, vehicle.number, text) for vehicle in run.vehicles for time_s, text in vehicle.witness.texts)
-        ),
-        folder="" if folder is None else str(folder),
-        ulogs=() if folder is None else tuple(str(path) for path in sorted(folder.rglob("flight*.ulg"))),
-        tlogs=() if folder is None else tuple(str(path) for path in sorted(folder.rglob("flight.tlog"))),
-        figures=dict(run.figures),
-    )
-    if folder is not None:
-        write_whole(folder / RESULT_FILE, (json.dumps(result.as_json(), indent=1) + "\n").encode())
-    return result
+        checks = judge(run, self._built.close(), simulated_s)
+        texts = [(time_s, vehicle.number, text) for vehicle in run.vehicles for time_s, text in vehicle.witness.texts]
+        result = ScenarioResult(
+            name=run.scenario.name or "scenario",
+            file=file,
+            seed=self.seed,
+            checks=checks,
+            error=error,
+            simulated_s=simulated_s,
+            cpu_s=process_time_s() - self._begun_s,
+            texts=tuple(sorted(texts)),
+            folder="" if folder is None else str(folder),
+            ulogs=() if folder is None else tuple(str(path) for path in sorted(folder.rglob("flight*.ulg"))),
+            tlogs=() if folder is None else tuple(str(path) for path in sorted(folder.rglob("flight.tlog"))),
+            figures=dict(run.figures),
+        )
+        if folder is not None:
+            write_whole(folder / RESULT_FILE, (json.dumps(result.as_json(), indent=1) + "\n").encode())
+        return result
 
 
 def _run_of(scenario: Scenario, built: Built) -> Run:
@@ -177,30 +241,6 @@ def _path(vehicle: VehicleRun) -> list[Any]:
         return []
     config = vehicle.flight.config
     return [point for _, point in planned_path(vehicle.plan, config.home, config.start_ne_m)]
-
-
-def _fly(run: Run, built: Built, faults: FaultTimeline) -> None:
-    """To the end of all scripts and a little on, or until time is up."""
-    scenario, vehicles = run.scenario, run.vehicles
-    running = [vehicle.running for vehicle in vehicles if vehicle.running is not None]
-    witnesses = [vehicle.witness for vehicle in vehicles]
-    end_us = round(scenario.time_max_s * 1e6)
-    over_us = end_us
-
-    def is_over(flight: Any) -> bool:
-        nonlocal over_us
-        time_us = flight.time_us
-        faults.frame(time_us)
-        if run.watch is not None:
-            run.watch.frame()
-        for witness in witnesses:
-            witness.look()
-        if over_us == end_us and running and all(each.is_done for each in running):
-            over_us = min(time_us + round(AFTER_S * 1e6), end_us - 1)
-        return bool(time_us >= over_us)
-
-    flown: Any = built.flights[0] if built.fleet is None else built.fleet
-    flown.run(is_over)
 
 
 def _error(run: Run, faults: FaultTimeline) -> str:

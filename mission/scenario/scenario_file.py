@@ -95,7 +95,7 @@ def scenario_of(root: Located, name: str, folder: Path) -> Scenario:
     """
     if not root.get("name"):
         root.put("name", name)
-    _resolve(root, folder.resolve())
+    resolve_paths(root, folder.resolve())
     try:
         return Scenario.model_validate(root)
     except ValidationError as error:
@@ -112,7 +112,7 @@ def _fault(error: ValidationError, root: Located) -> str:
     return f"{location}: {key}: {text}" if key else f"{location}: {text}"
 
 
-def _resolve(root: Located, folder: Path) -> None:
+def resolve_paths(root: dict[str, Any], folder: Path) -> None:
     """Makes paths absolute, as far as the file has the form that it should."""
     for vehicle in [root.get("vehicle"), *_mappings(root.get("vehicles"))]:
         if isinstance(vehicle, dict):

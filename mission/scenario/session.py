@@ -34,6 +34,8 @@ class Planned:
     seed: int
     keep: Path | None
     """Folder for the runs that fail."""
+    keeps_all: bool = False
+    """And for those that pass."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +58,7 @@ def fly(planned: Planned) -> Flown:
         return Flown(None, f"{planned.file}: {error}")
     if folder is None:
         return Flown(result)
-    if result.passed:
+    if result.passed and not planned.keeps_all:
         shutil.rmtree(folder)
         return Flown(replace(result, folder="", ulogs=(), tlogs=()))
     return Flown(result, command=keep_scenario(folder, planned.scenario, planned.seed))
@@ -161,10 +163,16 @@ def _tell(flown: Sequence[Flown], console: Console) -> None:
     results = [each.result for each in flown if each.result is not None]
     for each in flown:
         if each.result is not None and not each.result.passed:
-            print_line(console, f"{each.result.name}, seed {each.result.seed}:")
-            for text in each.result.failures:
-                print_line(console, f"  {text}")
-            if each.command:
-                print_line(console, f"  kept in {each.result.folder}; again: {each.command}")
+            for line in failure_lines(each):
+                print_line(console, line)
     passed, simulated_s = sum(result.passed for result in results), sum(result.simulated_s for result in results)
     print_line(console, f"{passed} of {len(flown)} passed, {simulated_s:.0f} simulated seconds")
+
+
+def failure_lines(flown: Flown) -> list[str]:
+    """What failed of a run, and how it is flown again."""
+    result = flown.result
+    if result is None:
+        return [flown.refusal]
+    kept = [f"  kept in {result.folder}; again: {flown.command}"] if flown.command else []
+    return [f"{result.name}, seed {result.seed}:", *(f"  {text}" for text in result.failures), *kept]

@@ -33,6 +33,7 @@ NOT_RUN_HERE = {
     ".venv/bin/python -m autopilot.estimator.derive": "tests/unit/autopilot/estimator/test_derive.py",
 }
 
+TESTS_THEMSELVES = {"docs/how-to/pytest.md"}  # run by tests/unit/mission/pytest_plugin/test_docs_example.py
 RUN_BY_OTHERS = (
     "pipx install ",
     "pip wheel ",
@@ -44,6 +45,7 @@ RUN_BY_OTHERS = (
     f"{HONEYGUIDE} world ",  # tests/unit/mission/world
     f"{HONEYGUIDE} fly --world ",  # tests/unit/mission/world/test_worked_example.py
     f"{HONEYGUIDE} mcap ",  # tests/system/commands/test_foxglove.py
+    "pytest ",  # tests/unit/mission/pytest_plugin
     f"{HONEYGUIDE} replay ",  # tests/unit/mission/view/test_replay.py
     f"{HONEYGUIDE} review ",  # tests/unit/mission/review/test_review_session.py
     f"{HONEYGUIDE} benchmark ",  # tests/unit/mission/follow/test_benchmark.py
@@ -209,7 +211,9 @@ def test_make_targets_that_are_shown_exist():
         assert set(shown) <= targets, page
 
 
-@pytest.mark.parametrize("name", [name for name, page in PAGES.items() if blocks(page, "python")])
+@pytest.mark.parametrize(
+    "name", [name for name, page in PAGES.items() if blocks(page, "python") and name not in TESTS_THEMSELVES]
+)
 def test_examples_run(name, tmp_path, monkeypatch):
     """The blocks of a page, in order, as one program."""
     monkeypatch.chdir(tmp_path)

@@ -34,6 +34,15 @@ class FaultTimeline:
         for fault in faults:
             self._check(fault)
 
+    def add(self, fault: Fault) -> None:
+        """One more, at its time.
+
+        Raises:
+            UserError: the part is not there to fail.
+        """
+        self._check(fault)
+        self._timed = sorted([*self._timed, fault], key=lambda each: each.at or 0.0)
+
     def frame(self, time_us: int) -> None:
         """Begins and ends what is due."""
         while self._timed and time_us >= (self._timed[0].at or 0.0) * 1e6:

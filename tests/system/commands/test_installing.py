@@ -15,7 +15,7 @@ PIP = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
 # Where what an extra brings is imported, when its commands are run.
 OF_EXTRAS = (
     *("policies.", "mission.view.", "mission.train.", "mission.follow.", "mission.park.park_session"),
-    "mission.benchmark.",
+    *("mission.benchmark.", "mission.pytest_plugin."),
     *("mission.scenario.flight.companions", "mission.scenario.flight.policy_steps"),
     "mission.scenario.judging.policy_figures",
     *("sim.engines.bullet", "sim.engines.jsbsim_", "sim.engines.quiet_"),
@@ -65,6 +65,15 @@ def test_a_bare_environment_flies_and_imports_all_but_what_extras_bring(tmp_path
     tested = run(python.with_name("honeyguide"), "test", "hop.scenario.yaml")
     assert tested.returncode == 0, tested.stderr
     assert "1 of 1 passed" in tested.stdout
+    subprocess.run([python, *PIP, "install", *constraints, "pytest"], check=True, env=environment)
+    (tmp_path / "test_hop.py").write_text(
+        "async def test_hop(vehicle, flight):\n    flight.check(tilt={'max': 40})\n    await vehicle.wait_ready()\n"
+        "    await vehicle.arm()\n    await vehicle.takeoff(5.0)\n    await vehicle.land()\n"
+    )
+    (tmp_path / "pytest.ini").write_text("[pytest]\nfilterwarnings = error\n")
+    flown = run(python.with_name("pytest"), "test_hop.py", "hop.scenario.yaml")
+    assert flown.returncode == 0, flown.stdout + flown.stderr
+    assert "2 passed" in flown.stdout
     refused = run(python.with_name("honeyguide"), "fly", "--engine", "pybullet")
     assert refused.returncode == 2, refused.stderr
     assert "the extra 'engines'" in refused.stderr

@@ -1,0 +1,1 @@
+"""What the pytest plugin does (`pytest_honeyguide.py` has its hooks): flown tests, and scenario files as tests."""
