@@ -70,8 +70,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
     console = Console()
     config = flight_config(options, state)
     plan = None if options.is_idle else _plan(options.plan, options.airframe, config.home)
-    signing = signing_config(options, speed, state)
-    foxglove = open_foxglove(options, held)
+    signing, foxglove = signing_config(options, speed, state), open_foxglove(options, held)
     links = [] if speed is None else open_links(options, speed)
     stream = open_stream(options.stream_port)
     is_reached = speed is not None and not options.stream_port  # stations are told of one stream

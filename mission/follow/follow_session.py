@@ -75,8 +75,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     speed = speed_of(options.speed)
     pilot, name = chosen_pilot(options)
     config = follow_config(options, has_scanner=isinstance(pilot, NavigationPilot))
-    foxglove = open_foxglove(options, held)
-    links = _links(options, config, speed)
+    foxglove, links = open_foxglove(options, held), _links(options, config, speed)
     page = open_page(options.view_port) if options.has_view else None
     folder = held.enter_context(run_folder(options.run_folder))
     with busy(console, "loading kernels") as say:
@@ -118,8 +117,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     session.fly(lambda _: running.is_done, running, [watch.frame])
     is_stopped = not running.is_done and not flight.end_reason
     running.cancel()
-    trouble = flight.end_reason or running.error
-    if trouble:
+    if trouble := flight.end_reason or running.error:
         print_line(console, f"result: {trouble}")
     is_down = not trouble and not flight.is_crashed
     exit_code = finish(watch, session.files, console, is_down=is_down, is_stopped=is_stopped)

@@ -17,6 +17,7 @@ PACKAGES = [folder for folder in FOLDERS if folder != "bench"]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 # Where an extra may be imported; everywhere else is what a plain install has.
 PLACES = {
+    "foxglove": ("mission/foxglove",),
     "viewer": ("mission/view",),
     "worlds": ("mission/view", "mission/world", "sim/world/custom/mesh_files.py"),
     "geo": ("sim/world/custom/heightmap.py",),
@@ -45,6 +46,8 @@ NAMED_OTHERWISE = {
     "serial": "pyserial",
     "stable_baselines3": "stable-baselines3",
     "warp": "warp-lang",
+    "foxglove": "foxglove-sdk",
+    "google": "protobuf",
     "yaml": "pyyaml",
 }
 # Declared because they are run, not imported.
