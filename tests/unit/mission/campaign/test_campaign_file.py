@@ -54,7 +54,7 @@ def test_a_scenario_may_be_a_file_beside_it(tmp_path):
     [
         ("runs: 10", "runz: 10", ":1: runz: unknown key; did you mean runs?"),
         ("{uniform: [0, 8]}", "{uniform: [8, 0]}", ":13: vary.wind.speed_m_s: uniform: the first bound must be"),
-        ("{uniform: [0, 8]}", "{unifrom: [0, 8]}", ":13: vary.wind.speed_m_s.unifrom: unknown key; did you mean uniform?"),
+        ("{uniform: [0, 8]}", "{unifrom: [0, 8]}", "vary.wind.speed_m_s.unifrom: unknown key; did you mean uniform?"),
         ("{uniform: [0, 8]}", "{loguniform: [0, 8]}", "loguniform: bounds must be above 0, not 0"),
         ("{uniform: [0, 8]}", "{uniform: [0, 80]}", "so: wind.speed_m_s: must be at most 20, not 80"),
         ("wind.speed_m_s: {uni", "wind.sped: {uni", "so: wind.sped: unknown key; did you mean speed_m_s?"),
