@@ -13,6 +13,7 @@ _BOUNDS = {
     "less_than": ("lt", "below"),
     "less_than_equal": ("le", "at most"),
 }
+NO_SUCH_KEY = "unknown key"
 _KINDS = {
     "float": "a number",
     "finite": "a finite number",
@@ -36,7 +37,7 @@ def sentence(error: ErrorDetails, model: type[BaseModel]) -> str:
     """
     kind, context = error["type"], error.get("ctx", {})
     if kind == "extra_forbidden":
-        return unknown_key(str(error["loc"][-1]), _keys_beside(model, error["loc"]))
+        return unknown_key(str(error["loc"][-1]), keys_beside(model, error["loc"]))
     if kind == "missing":
         return "is required"
     if kind == "literal_error":
@@ -55,10 +56,10 @@ def sentence(error: ErrorDetails, model: type[BaseModel]) -> str:
 def unknown_key(key: str, known_keys: Iterable[str]) -> str:
     """The sentence about a key that does not exist."""
     near = difflib.get_close_matches(key, [known for known in known_keys if known != key], n=1)
-    return f"unknown key; did you mean {near[0]}?" if near else "unknown key"
+    return f"{NO_SUCH_KEY}; did you mean {near[0]}?" if near else NO_SUCH_KEY
 
 
-def _keys_beside(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
+def keys_beside(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
     """The keys that the block with the last key of a path may have."""
     models = [model]
     for step in loc[:-1]:

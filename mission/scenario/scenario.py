@@ -10,12 +10,13 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from mission.flight_settings import EngineName, Pace, WorldKind
+from mission.flight_settings import EngineName, Pace
 from mission.scenario.parts.checks import Check
 from mission.scenario.parts.faults import Fault
 from mission.scenario.parts.part import Finite, Part, Place
 from mission.scenario.parts.steps import Step
 
+WorldName = Literal["hills", "plain", "airfield", "follow", "forest", "walled-forest", "course", "car-park"]
 VEHICLES_MAX = 50
 ITEM_MARK = "item "  # of a mission: the moment is when it is reached
 
@@ -23,7 +24,7 @@ ITEM_MARK = "item "  # of a mission: the moment is when it is reached
 class World(Part):
     """The ground. What is left out is as its kind has it."""
 
-    kind: WorldKind | Literal["plain", "airfield", "follow"] = "hills"
+    kind: WorldName = "hills"
     """hills: no trees within 80 m; plain: level, no trees; airfield: for planes; follow: hills an owner walks in;
     forest, walled-forest (for a rover), course and car-park: those that policies are judged in."""
     file: Path | None = None

@@ -99,7 +99,7 @@ def _value(schema: dict[str, Any]) -> str:
     if "$ref" in (schema.get("additionalProperties") or {}):
         return f"{_value(schema['additionalProperties'])} by key"
     if schema.get("type") == "object":
-        return "numbers by name"
+        return "bounds by name" if "propertyNames" in schema else "numbers by name"
     return _TYPES.get(schema.get("type", ""), "") + _bounds(schema)
 
 

@@ -195,6 +195,17 @@ def following(seen: Seen, check: c.Check, asked: c.Following) -> Judged:
     yield from following_figures(track, asked)
 
 
+def scorecard(seen: Seen, check: c.Check, asked: dict[str, c.Range]) -> Judged:
+    """Figures of the scorecard."""
+    del check
+    from mission.scenario.judging.policy_figures import scorecard_figures
+
+    track = None if seen.run.watch is None else seen.run.watch.track()
+    if track is None:
+        raise NothingToJudge("no policy followed")
+    yield from scorecard_figures(track, asked)
+
+
 def interventions(seen: Seen, _: c.Check, asked: c.Interventions) -> Judged:
     """How often the guard changed its policy's decisions."""
     companion = seen.run.companion

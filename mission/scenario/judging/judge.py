@@ -44,7 +44,8 @@ def _results(seen: Seen, check: c.Check) -> list[CheckResult]:
 
 
 def _said(check: c.Check) -> str:
-    given = check.chosen.model_dump(exclude_none=True)
+    chosen = check.chosen
+    given = chosen if isinstance(chosen, dict) else chosen.model_dump(exclude_none=True)
     return ", ".join(f"{key} {value}" for key, value in given.items())
 
 
@@ -72,5 +73,6 @@ JUDGES: dict[str, Judge] = {
     "no_contact": event_checks.no_contact,
     "touch_down": event_checks.touch_down,
     "following": event_checks.following,
+    "scorecard": event_checks.scorecard,
     "interventions": event_checks.interventions,
 }

@@ -1,12 +1,13 @@
 """How a policy followed, as checks ask it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import nan
 
 import numpy as np
 
-from mission.scenario.parts.checks import Following
+from mission.scenario.parts.checks import Following, Range
 from mission.scenario.result import CheckResult
+from policies.tasks.follow_me.scorecard import scorecard
 from policies.tasks.follow_me.track import Ranges, Track
 
 
@@ -37,3 +38,15 @@ def following_figures(track: Track, asked: Following) -> Iterator[CheckResult]:
         happened = f"a collision {worst:.1f} s after it began" if found else "no collision"
         wanted_text = "a collision" if asked.has_collision else "no collision"
         yield CheckResult("collision", found == asked.has_collision, wanted_text, happened)
+
+
+def scorecard_figures(track: Track, asked: Mapping[str, Range]) -> Iterator[CheckResult]:
+    """A result for each bound of each figure; one that there is nothing for fails."""
+    card = scorecard([track])
+    for name, bounds in asked.items():
+        value = getattr(card, name).value
+        title = name.replace("_", " ")
+        for word, bound, sign in (("at least", bounds.min, 1.0), ("at most", bounds.max, -1.0)):
+            if bound is not None:
+                margin = sign * (value - bound)
+                yield CheckResult(title, margin >= 0.0, f"{title} {word} {bound:g}", f"{value:.3g}", margin)

@@ -3,7 +3,7 @@
 How each is judged is in `judging.py`: all by the truth, after the flight, from the history that is kept at 50 Hz.
 """
 
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -203,6 +203,12 @@ class Following(Part):
     has_collision: bool | None = False
 
 
+FigureName = Literal[
+    "success", "tracking", "collision", "in_band", "distance_rmse_m", "distance_median_m", "bearing_error_deg",
+    "in_view", "losses_per_minute", "loss_s", "reacquired",
+]  # fmt: skip
+
+
 class Interventions(Short):
     """The guard changes the policy's decisions at most so often."""
 
@@ -258,4 +264,6 @@ class Check(OneOf):
     no_contact: NoContact | None = None
     touch_down: TouchDown | None = None
     following: Following | None = None
+    scorecard: dict[FigureName, Range] | None = None
+    """Figures of the scorecard of FollowMe, as `honeyguide follow` shows them, each with its bounds."""
     interventions: Interventions | None = None

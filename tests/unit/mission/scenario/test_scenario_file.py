@@ -1,5 +1,6 @@
 """Scenario files: what may be written short, and the sentence that each fault gets."""
 
+from dataclasses import fields
 from typing import get_args
 
 import pytest
@@ -7,14 +8,17 @@ import yaml
 
 from autopilot.interface.vehicle_state import Mode
 from mission.console.option_checks import UserError
+from mission.flight_settings import WorldKind
 from mission.scenario.flight.building import flight_configs
 from mission.scenario.flight.flying import ACTIONS
 from mission.scenario.judging.judge import JUDGES
-from mission.scenario.parts.checks import Check
+from mission.scenario.parts.checks import Check, FigureName
 from mission.scenario.parts.faults import SensorName
 from mission.scenario.parts.steps import ModeName, Step, Takeoff
-from mission.scenario.scenario import Scenario, World
+from mission.scenario.scenario import Scenario, World, WorldName
 from mission.scenario.scenario_file import READY, find_files, parse_scenario, read_scenario
+from policies.tasks.follow_me.scorecard import Scorecard
+from policies.tasks.intervals import Interval
 from sim.faults import BIAS_UNITS
 from sim.world.world import WorldConfig
 
@@ -76,6 +80,8 @@ def test_python_makes_the_same_scenario(tmp_path):
             "always: altitud > 3",
             "8: checks[0].always.condition: 'altitud': no such quantity",
         ),
+        ("about:", "xyz:", "1: xyz: unknown key; there are name, about, seeds,"),
+        ("about:", "world: {kind: lunar}\nabout:", "1: world.kind: must be hills, plain, airfield, follow, forest,"),
         ("about:", "aboot:", "1: aboot: unknown key; did you mean about?"),
         ("about: Up and down.", "about: [", "not YAML"),
         ("vehicle:\n", "vehicle:\n  plan: a.plan\n", "2: vehicle: plan and script: choose one"),
@@ -136,6 +142,8 @@ def test_names_are_those_of_the_parts_that_do_it():
     assert set(get_args(ModeName)) == {mode.name.lower() for mode in Mode}
     assert set(Step.names()) == ACTIONS.keys()
     assert set(Check.names()) == JUDGES.keys()
+    assert set(get_args(FigureName)) == {each.name for each in fields(Scorecard) if each.type is Interval}
+    assert set(get_args(WorldKind)) < set(get_args(WorldName))
 
 
 def test_a_wrong_parameter_is_refused_before_anything_flies():
