@@ -11,6 +11,7 @@ from mission.campaign.campaign import Campaign
 from mission.campaign.run_store import RunStore
 from mission.campaign.runs import Order, Record
 from mission.campaign.sampling import sample_orders
+from mission.console.option_checks import UserError
 
 Note = Callable[[Record], None]
 """Called with each run that is flown."""
@@ -44,7 +45,16 @@ class Flights:
         self.flown_count = 0
 
     def fly(self, orders: Sequence[Order]) -> list[Record]:
-        """The record of each order, in their order; what is kept already is not flown."""
+        """The record of each order, in their order; what is kept already is not flown.
+
+        Raises:
+            UserError: what is kept is of other values.
+        """
+        for order in orders:
+            kept = self._store.records.get(order.key)
+            if kept is not None and kept.order != order:
+                where = f"{self._store.path}: run {order.number} of {order.phase}"
+                raise UserError(f"{where} was flown with other values, by another version: name another --folder")
         missing = [order for order in orders if order.key not in self._store.records]
         for record in self._workers.fly(missing):
             self._store.add(record)

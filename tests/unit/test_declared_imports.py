@@ -32,6 +32,7 @@ PLACES = {
         *("policies/person_detector", "mission/benchmark/any_pilot.py"),
         *("mission/train", "mission/video/rtp_video.py", "mission/video/video_file.py"),
     ),
+    "ray": ("mission/campaign/workers/ray_cluster.py",),
     "dev": ("tests",),
     "bench": ("bench",),
     "mutants": ("tests/mutants",),

@@ -31,7 +31,7 @@ h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
 .rate { font-size: 2.2rem; font-weight: 600; }
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 21rem), 1fr)); gap: 1rem; }
 .plots svg { width: 100%; height: auto; display: block; }
-figure { margin: 0; } figcaption { font-size: .85rem; }
+figure { margin: 0; max-width: 34rem; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .85rem; }
 th, td { border-bottom: 1px solid var(--line); padding: .3rem .6rem; text-align: left; vertical-align: top; }
@@ -90,7 +90,8 @@ def _figure(draw: Draw) -> str:
 
 def _success(findings: Findings) -> Iterator[str]:
     campaign, success = findings.campaign, findings.success
-    yield f'<p><span class="rate">{success.value:.1%}</span> success, {escape(fraction_text(success))}</p>'
+    counted = fraction_text(success).partition(" (")[2].removesuffix(")")
+    yield f'<p><span class="rate">{success.value:.1%}</span> success: {escape(counted)}</p>'
     if campaign.require:
         met = "met" if findings.is_met else '<strong class="failed">not met</strong>'
         yield f"<p>Required: {escape(campaign.require)}: {met}.</p>"

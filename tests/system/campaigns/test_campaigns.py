@@ -20,6 +20,7 @@ from mission.campaign.workers.fly_run import fly_run
 from mission.cli import app
 from tests.documents import ROOT, blocks
 
+GALE = ROOT / "mission" / "campaign" / "ready" / "gale-in-hold.campaign.yaml"
 PAGE = ROOT / "docs" / "how-to" / "campaigns.md"
 HOP = """name: hop
 runs: 6
@@ -133,23 +134,16 @@ def test_wrong_input_is_2(tmp_path):
     assert "--batch: step velocity needs MAVLink; fly it without --batch" in result.output.replace("\n", " ")
 
 
-def test_a_batch_judges_as_processes_do(tmp_path):
-    """Margins differ by centimetres: without MAVLink an order comes some frames earlier, in another gust."""
-    file = tmp_path / "hop.campaign.yaml"
-    file.write_text(
-        HOP.replace("  checks:", "  faults: [{at: 18, wind: {speed_m_s: 14, from_deg: 0}}]\n  checks:").replace(
-            "within_m: 3.2", "within_m: 3.02"
-        )
-    )
-    read = read_campaign(file)
+def test_a_batch_judges_as_processes_do():
+    """Verdicts are the same; margins nearly: without MAVLink an order comes some frames earlier, in another gust."""
+    read = read_campaign(GALE)
     orders = sample_orders(read, 12)
     batch, alone = fly_batch(read, orders), [fly_run(read, order) for order in orders]
-    assert {record.passed for record in alone} == {True, False}
+    assert [record.passed for record in alone].count(False) == 3
     for ours, theirs in zip(batch, alone, strict=True):
         assert ours.error == theirs.error == ""
-        assert abs(ours.margin - theirs.margin) < 0.15
-        if abs(theirs.margin) > 0.15:
-            assert (ours.passed, ours.verdicts) == (theirs.passed, theirs.verdicts)
+        assert ours.verdicts == theirs.verdicts
+        assert ours.margins["hold"] == pytest.approx(theirs.margins["hold"], abs=0.2)
         assert abs(ours.simulated_s - theirs.simulated_s) < 1.0
 
 

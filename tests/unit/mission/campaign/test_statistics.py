@@ -66,4 +66,4 @@ def test_the_worst_are_first_and_those_without_a_margin_before_all():
         record(2, {}, None, error="hung"),
         record(3, {}, 3.0, passed=False),
     ]
-    assert [each.number for each in worst_first(records)] == [2, 3, 1, 0]
+    assert [each.number for each in worst_first(records)] == [2, 1, 3, 0]
