@@ -32,6 +32,7 @@ PLACES = {
         *("policies/person_detector", "mission/benchmark/any_pilot.py"),
         *("mission/train", "mission/video/rtp_video.py", "mission/video/video_file.py"),
     ),
+    "test": ("mission/pytest_plugin",),
     "ray": ("mission/campaign/workers/ray_cluster.py",),
     "dev": ("tests",),
     "bench": ("bench",),
@@ -84,7 +85,9 @@ def imported(path: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             names.append(node.module)
     modules = {name.split(".")[0] for name in names}
-    own = {*PACKAGES, "bench", "docs", "tests"} | {sibling.stem for sibling in path.parent.glob("*.py")}
+    own = {*PACKAGES, "bench", "docs", "tests", "pytest_honeyguide"} | {
+        sibling.stem for sibling in path.parent.glob("*.py")
+    }
     return {NAMED_OTHERWISE.get(each, each).lower() for each in modules - own - sys.stdlib_module_names}
 
 
