@@ -66,8 +66,10 @@ class Record:
 
     @property
     def score(self) -> float:
-        """By which runs are ranked: the margin; what failed without one is the worst, and what failed by another check
-        than the one whose margin counts has just failed."""
+        """By which runs are ranked: the margin; what failed without one is the worst.
+
+        What failed by another check than the one whose margin counts has just failed.
+        """
         if self.passed:
             return inf if self.margin is None else self.margin
         return -inf if self.margin is None else min(self.margin, 0.0)
