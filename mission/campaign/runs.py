@@ -66,10 +66,9 @@ class Record:
 
     @property
     def score(self) -> float:
-        """By which runs are ranked: the margin.
+        """By which runs are ranked: the margin; what failed without one is the worst.
 
-        What failed without one is the worst, and what failed by another check than the one whose margin counts has just
-        failed.
+        What failed by another check than the one whose margin counts has just failed.
         """
         if self.passed:
             return inf if self.margin is None else self.margin

@@ -5,7 +5,7 @@ that a client sends.
 """
 
 from collections.abc import Callable, Iterator
-from math import dist, inf, nan, radians
+from math import dist, nan, radians
 from typing import Any
 
 from autopilot.interface.client_requests import ChangeMode, ChangeSpeed, GoTo, LandAt, TakeOff
@@ -67,7 +67,7 @@ def _takeoff(_: Run, vehicle: VehicleRun, step: s.Takeoff) -> Steps:
     down = _home_down(vehicle) - step.height_m
 
     def is_there() -> bool:
-        return abs(controller.state.estimate.pos_ned[2] - down) < HEIGHT_WITHIN_M
+        return abs(float(controller.state.estimate.pos_ned[2]) - down) < HEIGHT_WITHIN_M
 
     yield from _until(vehicle, is_there, step.timeout_s, f"takeoff to {step.height_m:g} m")
     yield from _until(vehicle, lambda: controller.state.mode is Mode.HOLD, step.timeout_s, "hold after takeoff")
@@ -148,4 +148,3 @@ STEPS: dict[str, Callable[[Run, VehicleRun, Any], Steps]] = {
     "return_home": _return_home,
     "wait_disarmed": _wait_disarmed,
 }
-FOREVER_S = inf

@@ -8,6 +8,7 @@ import io
 import re
 from collections.abc import Callable, Sequence
 from math import isfinite
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -27,7 +28,7 @@ PASSED_COLOUR, FAILED_COLOUR, INK = TRUE_COLOUR, ESTIMATE_COLOUR, "#010203"
 KEYS_MAX = 8  # plots of varied keys, those that matter most
 DRAWN_MAX = 2000  # points of a plot
 HISTOGRAM_BINS = 30
-_STYLE = {
+_STYLE: Any = {
     "font.size": 9,
     "svg.fonttype": "none",
     "svg.hashsalt": "honeyguide",
@@ -85,7 +86,7 @@ def margins_plot(findings: Findings) -> Draw | None:
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
-        margins = {passed: [r.margin for r in judged if r.passed is passed] for passed in (True, False)}
+        margins = {passed: [r.margin or 0.0 for r in judged if r.passed is passed] for passed in (True, False)}
         edges = np.histogram_bin_edges([r.margin or 0.0 for r in judged], min(HISTOGRAM_BINS, max(5, len(judged) // 4)))
         axes.hist([margins[True], margins[False]], edges.tolist(), stacked=True, color=[PASSED_COLOUR, FAILED_COLOUR],
                   label=[f"passed ({len(margins[True])})", f"failed ({len(margins[False])})"])  # fmt: skip

@@ -9,6 +9,7 @@ import os
 import socket
 from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
+from logging import ERROR
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -89,7 +90,7 @@ def _drive(campaign: Campaign, address: str, connection: "Connection[Any, Any]")
     import ray
 
     try:
-        ray.init(address=address, log_to_driver=False, logging_level="ERROR")
+        ray.init(address=address, log_to_driver=False, logging_level=ERROR)
         remote = ray.remote(max_retries=TRIES, retry_exceptions=False)(_fly)
         shared = ray.put(campaign)
         while True:
