@@ -1,4 +1,4 @@
-"""Scenarios with other values at some keys: `wind.speed_m_s`, `faults.0.at`, `vehicle.parameters.MPC_XY_P`.
+"""Scenarios with other values at some keys: `wind.speed_m_s`, `faults.0.at`, `vehicle.parameters.COM_WIND_MAX`.
 
 In: a scenario and values by key. Out: the scenario of one run, checked as one from a file is. Light to import.
 """
