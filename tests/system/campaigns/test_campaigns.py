@@ -189,7 +189,7 @@ class Head:
                 break
 
     def end(self):
-        os.killpg(self._process.pid, signal.SIGTERM)
+        os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait(60.0)
 
 
