@@ -29,7 +29,7 @@ PLACES = {
         *("policies/person_detector", "mission/benchmark/any_pilot.py"),
         *("mission/train", "mission/video/rtp_video.py", "mission/video/video_file.py"),
     ),
-    "dev": ("tests",),
+    "dev": ("tests", "mission/pytest_plugin"),  # pytest, of whoever runs it
     "bench": ("bench",),
     "mutants": ("tests/mutants",),
 }
@@ -77,7 +77,9 @@ def imported(path: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             names.append(node.module)
     modules = {name.split(".")[0] for name in names}
-    own = {*PACKAGES, "bench", "docs", "tests"} | {sibling.stem for sibling in path.parent.glob("*.py")}
+    own = {*PACKAGES, "bench", "docs", "tests", "pytest_honeyguide"} | {
+        sibling.stem for sibling in path.parent.glob("*.py")
+    }
     return {NAMED_OTHERWISE.get(each, each).lower() for each in modules - own - sys.stdlib_module_names}
 
 
