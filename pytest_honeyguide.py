@@ -20,7 +20,7 @@ MARKER = "honeyguide"
 FLIGHT, CHOICE = "_honeyguide_flight", "_honeyguide_choice"  # fixtures behind those that tests ask for
 COROUTINE = pytest.StashKey[Any]()
 """The function of a test that flies, as its author wrote it: other plugins may wrap it."""
-REPORTED = pytest.StashKey[str]()
+SHOWN = pytest.StashKey[str]()
 """What is shown of the flight of a test that failed."""
 
 
@@ -121,8 +121,8 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Shows the flight of a test that failed."""
     report = yield
-    if COROUTINE in item.stash and report.failed and report.when != "teardown" and item.stash.get(REPORTED, ""):
-        report.sections.append(("flight", item.stash[REPORTED]))
+    if COROUTINE in item.stash and report.failed and report.when != "teardown" and item.stash.get(SHOWN, ""):
+        report.sections.append(("flight", item.stash[SHOWN]))
     return report
 
 

@@ -14,6 +14,7 @@ from autopilot.mavlink.dialects import Dialect, UnknownModeError
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.wire.codec import message_id
+from common.airframe import DEFAULT_VEHICLE
 from common.attitude import quat_of_roll_pitch_yaw
 from common.clock import wall_time_s
 from mission.boards.outside_controller import NEEDED_HZ, RATES_HZ
@@ -114,7 +115,7 @@ class HeardTelemetry:
         heartbeat = self.drone.latest("HEARTBEAT")
         if heartbeat is None:
             return self._mode
-        name = {GROUND_ROVER: "rover", FIXED_WING: "plane"}.get(heartbeat.type, "multirotor")
+        name = {GROUND_ROVER: "rover", FIXED_WING: "plane"}.get(heartbeat.type, DEFAULT_VEHICLE)
         vehicle = next(each.vehicle for each in VEHICLES if each.vehicle.name == name)
         try:
             dialect = self._dialect.of_vehicle(vehicle.modes, vehicle.ardupilot)

@@ -23,7 +23,7 @@ from mission.scenario.flight.building import check_scenario
 from mission.scenario.keeping import emptied
 from mission.scenario.result import ScenarioResult
 from mission.scenario.scenario import Scenario
-from pytest_honeyguide import REPORTED
+from pytest_honeyguide import SHOWN
 
 _FLIGHT = pytest.StashKey[TestedFlight]()
 _NAME_MAX = 150  # of a folder [characters]
@@ -99,7 +99,7 @@ def _end(item: pytest.Function, error: BaseException | None) -> ScenarioResult:
     flight = item.stash[_FLIGHT]
     del item.stash[_FLIGHT]
     result = flight.end(_said(error))
-    item.stash[REPORTED] = flight_text(result, flight.title, _again(item))
+    item.stash[SHOWN] = flight_text(result, flight.title, _again(item))
     is_good = isinstance(error, pytest.skip.Exception) or result.passed
     if result.folder and is_good and not item.config.getoption("honeyguide_keep_all"):
         shutil.rmtree(result.folder)

@@ -172,7 +172,7 @@ class LockstepFlight(TestedFlight):
 
     def finish_orders(self) -> None:
         if any(vehicle.running is not None for vehicle in self._run.vehicles):
-            self._under_way.fly(self._under_way.is_scripted_done)
+            self._under_way.fly(self._under_way.are_orders_done)
 
     def end(self, error: str) -> ScenarioResult:
         self._is_over = True

@@ -50,7 +50,7 @@ def run_scenario(
     flown = UnderWay(scenario, scenario.seeds[0] if seed is None else seed, folder)
     try:
         flown.start()
-        flown.fly(flown.is_scripted_done)
+        flown.fly(flown.are_orders_done)
     except BaseException:
         flown.give_up()
         raise
@@ -111,7 +111,7 @@ class UnderWay:
         flown: Any = self._built.flights[0] if self._built.fleet is None else self._built.fleet
         flown.run(is_enough)
 
-    def is_scripted_done(self) -> bool:
+    def are_orders_done(self) -> bool:
         """Whether all scripts are done, and a little more."""
         running = [vehicle.running for vehicle in self.run.vehicles if vehicle.running is not None]
         time_us = self.run.vehicles[0].flight.time_us

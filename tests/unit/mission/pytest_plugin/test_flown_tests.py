@@ -1,4 +1,4 @@
-"""Tests that fly, in a pytest of their own: in simulated time, by their marker, judged, shown if they fail."""
+"""Tests that fly, in a pytest of their own: in simulated time, by their marker, judged and shown in the end."""
 
 import json
 
