@@ -5,12 +5,11 @@ campaign that was interrupted goes on where it was: the searches choose the same
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 from mission.campaign.campaign import Campaign
 from mission.campaign.run_store import RunStore
 from mission.campaign.runs import Order, Record
-from mission.campaign.sampling import sample_orders
 from mission.console.option_checks import UserError
 
 Note = Callable[[Record], None]
@@ -61,27 +60,3 @@ class Flights:
             self.flown_count += 1
             self._note(record)
         return [self._store.records[order.key] for order in orders]
-
-
-def fly_campaign(flights: Flights, runs: int) -> tuple[list[Record], list[Any]]:
-    """The samples, and what each search has found."""
-    campaign = flights.campaign
-    samples = flights.fly(sample_orders(campaign, runs))
-    found = [
-        search_of(flights, search, f"{search.name_chosen}-{number}") for number, search in enumerate(campaign.search)
-    ]
-    return samples, found
-
-
-def search_of(flights: Flights, search: Any, phase: str) -> Any:
-    """What a search has found."""
-    from mission.campaign.search.bisection import bisect
-    from mission.campaign.search.rare_failures import estimate_rare
-    from mission.campaign.search.worst_case import find_worst
-
-    kinds: dict[str, Callable[[Flights, Any, str], Any]] = {
-        "bisect": bisect,
-        "worst": find_worst,
-        "rare": estimate_rare,
-    }
-    return kinds[search.name_chosen](flights, search.chosen, phase)

@@ -12,10 +12,11 @@ from rich.table import Table
 
 from mission.campaign.campaign import Campaign
 from mission.campaign.findings import SUMMARY_FILE, Findings, findings_of, fraction_text, write_summary
-from mission.campaign.flying import Flights, Note, Stopped, Workers, fly_campaign
+from mission.campaign.flying import Flights, Note, Stopped, Workers
 from mission.campaign.report.page import REPORT_FILE, write_report
 from mission.campaign.run_store import RunStore
 from mission.campaign.runs import Record
+from mission.campaign.search.whole import fly_campaign
 from mission.console.option_checks import UserError
 from mission.console.terminal import print_line
 

@@ -25,11 +25,14 @@ ENDED = ("flight.ulg ended", "flight.tlog ended", "log_00001.ulg ended", "Signin
 def no_room():
     """Inside, no file of this process may grow beyond a few bytes: writing to it is an OSError, as on a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    kept = sys.dont_write_bytecode
+    sys.dont_write_bytecode = True  # of modules that are imported meanwhile: it would be cut off, and stay so
     resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM_BYTES, hard))
     try:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        sys.dont_write_bytecode = kept
 
 
 def signed_flight(folder):

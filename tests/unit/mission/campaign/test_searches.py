@@ -5,9 +5,10 @@ from statistics import NormalDist
 import pytest
 
 from mission.campaign.campaign import Campaign
-from mission.campaign.flying import Flights, search_of
+from mission.campaign.flying import Flights
 from mission.campaign.run_store import RunStore
 from mission.campaign.runs import Record
+from mission.campaign.search.whole import search_of
 
 
 class Formula:

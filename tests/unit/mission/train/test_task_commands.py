@@ -89,11 +89,11 @@ def test_existing_dataset_is_left_alone(run, tmp_path):
 
 
 def in_process(*words):
-    """The command in a process of its own, whose files may have 2 kB."""
+    """The command in a process of its own, whose files may have 2 kB; bytecode would be cut off: it keeps none."""
     program = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (2048, 2048))\n"
     program += "from mission.cli import main; main()"
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[4])}
-    line = [sys.executable, "-c", program, *words]
+    line = [sys.executable, "-B", "-c", program, *words]
     return subprocess.run(line, env=environment, text=True, capture_output=True, check=False)
 
 
