@@ -36,7 +36,6 @@ SPEAK_OF_ROTORS = {
     "mission/boards/vehicle_params.py": "what an outside autopilot has to know of a multirotor",
     "mission/plan/plan_file.py": "MAVLink's name of a vehicle type, in QGroundControl's files",
     "mission/view/shapes.py": "the shape of a multirotor",
-    "mission/pytest_plugin/heard_telemetry.py": "which class of vehicles answers at a link, by MAVLink's types",
     "mission/review/summary.py": "MAVLink's names of vehicle types, in logs of others",
     "mission/console/option_checks.py": "which engine moves what",
     "sim/engines/bullet.py": "which classes Bullet moves",
