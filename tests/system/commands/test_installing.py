@@ -15,7 +15,7 @@ PIP = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
 # Where what an extra brings is imported, when its commands are run.
 OF_EXTRAS = (
     *("policies.", "mission.view.", "mission.train.", "mission.follow.", "mission.park.park_session"),
-    *("mission.benchmark.", "mission.pytest_plugin."),
+    *("mission.benchmark.", "mission.pytest_plugin.", "mission.foxglove."),
     *("mission.scenario.flight.companions", "mission.scenario.flight.policy_steps"),
     "mission.scenario.judging.policy_figures",
     *("sim.engines.bullet", "sim.engines.jsbsim_", "sim.engines.quiet_"),
@@ -55,7 +55,8 @@ def test_a_bare_environment_flies_and_imports_all_but_what_extras_bring(tmp_path
 
     imports = run(python, "-c", IMPORT_ALL)
     assert imports.returncode == 0, imports.stderr
-    assert not [module for module in imports.stdout.split() if not module.startswith(OF_EXTRAS)]
+    left = [module for module in imports.stdout.split() if not module.startswith(OF_EXTRAS)]
+    assert not left, " ".join(left)
     arguments = ("fly", "--once", "--speed", "max", "--seconds", "5", "--run-folder", "flight")
     flight = run(python.with_name("honeyguide"), *arguments)
     assert flight.returncode == 1, flight.stderr  # it ended before its mission
