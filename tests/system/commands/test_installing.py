@@ -16,6 +16,7 @@ PIP = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
 OF_EXTRAS = (
     *("policies.", "mission.view.", "mission.train.", "mission.follow.", "mission.park.park_session"),
     *("mission.benchmark.", "mission.pytest_plugin.", "mission.foxglove."),
+    *("mission.world.world_export", "mission.world.world_shapes"),
     *("mission.scenario.flight.companions", "mission.scenario.flight.policy_steps"),
     "mission.scenario.judging.policy_figures",
     *("sim.engines.bullet", "sim.engines.jsbsim_", "sim.engines.quiet_"),
