@@ -18,6 +18,7 @@ from bench.cars.run import Curve, changed
 from bench.page_section import kept_from
 from bench.row import machine
 from common.files import write_whole
+from common.intervals import bootstrap, rate
 from policies.learn.config.load import load_config
 from policies.learn.config.recipes import recipe
 from policies.learn.export.policy_file import load_policy, save_policy
@@ -30,7 +31,6 @@ from policies.tasks.catalogue import build_task, settings_of, task_settings
 from policies.tasks.drive.drive import Drive
 from policies.tasks.drive.drive_kernels import MEASURES
 from policies.tasks.episode import Outcome
-from policies.tasks.intervals import bootstrap, rate
 
 LEGS = {"park": ("drive-park", "drive-park-careful"), "reach": ("drive-reach",)}
 AIMS = {"park": "97 %", "reach": "95 %"}

@@ -20,6 +20,7 @@ from bench.drive import AIMS, FLOWN, PAGE_FILE, SEED, Drives, judged
 from bench.page_section import with_section
 from bench.row import machine
 from common.files import write_whole
+from common.intervals import rate
 from mission.flight import FlightConfig
 from mission.follow.lockstep import flight_with_driver
 from mission.park.park_session import REVERSES
@@ -34,7 +35,6 @@ from policies.learn.networks.policy import Policy
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.drive.drive import Drive
 from policies.tasks.episode import Outcome
-from policies.tasks.intervals import rate
 from sim.world.world import WorldMap
 
 SCENES = 300

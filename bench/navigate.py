@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from bench.page_section import kept_from
 from bench.row import machine
 from common.files import write_whole
+from common.intervals import Interval, bootstrap, rate
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy
 from policies.learn.networks.policy import Policy
@@ -24,7 +25,6 @@ from policies.learn.rollout.task_tensors import TaskTensors
 from policies.learn.torch_threads import few_threads
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.episode import Outcome
-from policies.tasks.intervals import Interval, bootstrap, rate
 from policies.tasks.navigate.navigate import Navigate
 from policies.tasks.navigate.navigate_kernels import MEASURES
 from policies.tasks.navigate.navigate_top_view import plant

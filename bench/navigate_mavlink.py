@@ -16,6 +16,7 @@ from bench.navigate import FLOWN
 from bench.page_section import with_section
 from bench.row import machine
 from common.files import write_whole
+from common.intervals import bootstrap, rate
 from mission.benchmark.goal_flights import Crossing
 from mission.benchmark.navigating import Forest, cross
 from policies.companion.guard.settings import GuardSettings
@@ -23,7 +24,6 @@ from policies.companion.vector_pilot import NavigationPilot
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy
 from policies.tasks.follow_me.scorecard import written
-from policies.tasks.intervals import bootstrap, rate
 
 ENDS = ("arrived", "collision", "over the forest", "other")
 DENSITIES = (200.0, 400.0, 600.0)

@@ -25,9 +25,9 @@ from common.airframes.plane import PlaneAirframe
 from common.clock import wall_unix_us
 from common.folder import ConfinedFolder
 from common.kernels import FRAME_TICKS, FRAME_US, TICK_US
+from common.logs.tlog import TlogWriter
 from common.params import Parameter
 from common.state_folder import StateFolder
-from common.tlog import TlogWriter
 from mission.flight_base import Computer, FlightBase
 from mission.flight_config import FlightConfig, as_launched, flight_parameters
 from mission.log.flight_recorder import History, Recorder

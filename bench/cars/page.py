@@ -9,7 +9,7 @@ from bench.cars.experiments import SECTIONS, Image, Section
 from bench.cars.result import Result
 from bench.cars.statistics import over_seeds
 from common.files import write_whole
-from policies.tasks.intervals import wilson_interval
+from common.intervals import wilson_interval
 
 DOCS = Path(__file__).parent.parent.parent / "docs" / "results"
 _COLUMNS = (

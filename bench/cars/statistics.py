@@ -5,7 +5,7 @@ from math import sqrt
 
 import numpy as np
 
-from policies.tasks.intervals import Interval
+from common.intervals import Interval
 
 # Student's t, two-sided 95 %, by degrees of freedom (any statistics table).
 T_95 = {1: 12.706, 2: 4.303, 3: 3.182, 4: 2.776, 5: 2.571, 6: 2.447, 7: 2.365, 8: 2.306, 9: 2.262}

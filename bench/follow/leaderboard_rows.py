@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bench.cars.page import DOCS
 from common.files import write_whole
-from policies.tasks.intervals import Interval, bootstrap, rate
+from common.intervals import Interval, bootstrap, rate
 
 ROWS = DOCS / "leaderboard.jsonl"
 CONDITIONS = ("walk", "run", "late-200", "gone-8", "no-depth", "twins")

@@ -10,9 +10,9 @@ from bench.follow import pictures
 from bench.follow.result import Judged, Result
 from bench.follow.stages import CELLS, OWNER_SPEEDS, STAGES, Stage, in_order
 from common.files import write_whole
+from common.intervals import Interval
 from policies.tasks.follow_me.scorecard import NAMES, written
 from policies.tasks.follow_me.track import Ranges
-from policies.tasks.intervals import Interval
 
 REWARDS = {"ours": "follow-reward", "the document's": "follow-document-reward"}  # what is drawn, and where
 Results = Mapping[str, Sequence[Result]]

@@ -9,8 +9,8 @@ from typing import Any
 
 from bench.cars.result import POINTS_KEPT, Point
 from common.files import write_whole
+from common.intervals import Interval
 from policies.tasks.follow_me.scorecard import NAMES, Scorecard
-from policies.tasks.intervals import Interval
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,8 +55,20 @@ def sentence(error: ErrorDetails, model: type[BaseModel]) -> str:
 
 def unknown_key(key: str, known_keys: Iterable[str]) -> str:
     """The sentence about a key that does not exist."""
-    near = difflib.get_close_matches(key, [known for known in known_keys if known != key], n=1)
-    return f"{NO_SUCH_KEY}; did you mean {near[0]}?" if near else NO_SUCH_KEY
+    meant = nearest(key, known_keys)
+    return f"{NO_SUCH_KEY}; {meant}" if meant else NO_SUCH_KEY
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """The question whether the nearest of the known names was meant; "": none is near."""
+    near = difflib.get_close_matches(name, [each for each in known if each != name], n=1)
+    return f"did you mean {near[0]}?" if near else ""
+
+
+def meant_or_known(name: str, known: Iterable[str]) -> str:
+    """That question, or else all names there are."""
+    names = list(known)
+    return nearest(name, names) or f"there are {', '.join(names) or 'none'}"
 
 
 def keys_beside(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:

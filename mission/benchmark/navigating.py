@@ -10,6 +10,7 @@ from math import cos, isfinite, pi, sin
 
 import numpy as np
 
+from common.intervals import bootstrap, rate
 from mission.benchmark.benchmark import Benchmark
 from mission.benchmark.goal_flights import Crossing, advance, crossed, send_goto
 from mission.benchmark.goal_pilots import goal_pilot
@@ -21,7 +22,6 @@ from mission.simulator.flight_rig import TURBULENCE
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.vector_pilot import NavigationPilot
 from policies.tasks.follow_me.scorecard import written
-from policies.tasks.intervals import bootstrap, rate
 from policies.tasks.navigate.observe import GOAL_MAX_M, RAY_STACK
 from sim.wind import wind_model
 from sim.world.forest_world import FOREST

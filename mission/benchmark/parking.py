@@ -10,6 +10,7 @@ from math import nan
 
 import numpy as np
 
+from common.intervals import bootstrap, rate
 from mission.benchmark.benchmark import Benchmark, changed_per_min
 from mission.benchmark.goal_pilots import goal_pilot
 from mission.flight_config import FlightConfig
@@ -22,7 +23,6 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.vector_pilot import DrivingPilot
 from policies.tasks.drive.observe import STACK
 from policies.tasks.follow_me.scorecard import written
-from policies.tasks.intervals import bootstrap, rate
 from sim.wind import wind_model
 from sim.world.driving_worlds import CAR_PARK
 from sim.world.spots import spots_of

@@ -18,7 +18,7 @@ from autopilot.mavlink.transport.links import Link, LinkError, LinkRole, LinkSou
 from autopilot.mavlink.wire.codec import Frame, known_type
 from common.airframe import load_airframe
 from common.kernels import FRAME_US
-from common.tlog import TlogWriter
+from common.logs.tlog import TlogWriter
 from mission.boards.outside_controller import OutsideController
 from mission.boards.peers import OutsideBoard, Peer
 from mission.flight_base import FlightBase

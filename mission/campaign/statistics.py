@@ -12,10 +12,10 @@ from math import sqrt
 import numpy as np
 import numpy.typing as npt
 
+from common.intervals import Z_95, wilson_interval
 from mission.campaign.campaign import SEED_KEY, Campaign
 from mission.campaign.runs import Record
 
-Z_95 = 1.959963984540054
 BINS_MAX, BIN_RUNS = 8, 10  # bins of a value, with at least so many runs in each
 Rows = npt.NDArray[np.float64]
 
@@ -60,13 +60,7 @@ class Sensitivity:
 
 def wilson(count: int, total: int) -> Fraction:
     """Wilson's 95 % interval of a fraction."""
-    if not total:
-        return Fraction(0, 0, 0.0, 1.0)
-    p, z2 = count / total, Z_95**2
-    middle = (p + z2 / (2 * total)) / (1 + z2 / total)
-    half = Z_95 / (1 + z2 / total) * sqrt(p * (1 - p) / total + z2 / (4 * total**2))
-    low = 0.0 if count == 0 else max(0.0, middle - half)
-    return Fraction(count, total, low, 1.0 if count == total else min(1.0, middle + half))
+    return Fraction(count, total, *wilson_interval(count, total))
 
 
 def success_of(records: Sequence[Record]) -> Fraction:

@@ -19,8 +19,8 @@ from rich.table import Table
 from common.clock import wall_time_s
 from common.files import write_whole
 from common.geodesy import GeoPoint, geodetic_from_ned
+from common.logs.ulog import UlogWriter
 from common.params import ParameterError, ParameterTable
-from common.ulog import UlogWriter
 from mission.console.option_checks import UserError, parameter_of
 from mission.console.terminal import print_line
 from mission.estimate.estimate_difference import Difference

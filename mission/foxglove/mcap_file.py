@@ -10,7 +10,7 @@ from pathlib import Path
 from foxglove import Context, open_mcap
 from foxglove.mcap import MCAPWriteOptions
 
-from common.log_file import LogFile
+from common.logs.log_file import LogFile
 
 FILE = "flight.mcap"
 CHUNK_BYTES = 1 << 20

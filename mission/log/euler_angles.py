@@ -27,6 +27,13 @@ def euler_rad(quaternions: Rows) -> Rows:
     )
 
 
+def tilt_deg(quaternions: Rows) -> Rows:
+    """Angle between body down and down, of (x, y, z, w) rows; shape (rows,)."""
+    x, y = quaternions[:, :2].astype(float).T
+    angles: Rows = np.degrees(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
+    return angles
+
+
 def yaw_rad(quaternions: Rows) -> Rows:
     """Heading [rad] of (x, y, z, w) rows; shape (rows,)."""
     x, y, z, w = quaternions.T

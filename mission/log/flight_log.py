@@ -17,8 +17,8 @@ from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_state import LandedState, Severity
 from autopilot.mavlink.services.identity import project_version
 from common.airframe import Airframe
+from common.logs.ulog import UlogTopic, UlogWriter
 from common.params import ParameterTable
-from common.ulog import UlogTopic, UlogWriter
 from mission.log.log_topics import TOPICS
 from mission.log.topic import Batch, Columns, Topic
 

@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 from autopilot.interface.platform import LogFile
 from common.files import part_path
-from common.log_file import PART_BYTES_MAX
+from common.logs.log_file import PART_BYTES_MAX
 from common.params import ParameterTable
 from mission.log.flight_recorder import Recorder
 

@@ -3,7 +3,6 @@
 Markers of a module, a class, a test and its parameters go together, and the nearest of a key holds.
 """
 
-import difflib
 from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any, TypeVar
 import pytest
 from pydantic import BaseModel, ValidationError
 
-from common.config.refusal import sentence
+from common.config.refusal import meant_or_known, sentence
 from mission.console.option_checks import UserError
 from mission.scenario.parts.checks import Check
 from mission.scenario.scenario import Scenario, Vehicle
@@ -47,9 +46,7 @@ def given_keys(item: pytest.Item) -> Keys:
             raise MarkerError(f"{_at(item)}: takes keys only, as wind=5, not {marker.args[0]!r}")
         for key, value in marker.kwargs.items():
             if key not in KEYS:
-                near = difflib.get_close_matches(key, KEYS, n=1)
-                hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(sorted(KEYS))}"
-                raise MarkerError(f"{_at(item)}: unknown key {key}; {hint}")
+                raise MarkerError(f"{_at(item)}: unknown key {key}; {meant_or_known(key, sorted(KEYS))}")
             for many, one in SEVERAL.items():  # the nearest holds, in either form
                 if key in (many, one):
                     found.pop(many, None)

@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from mission.log.euler_angles import euler_rad
+from mission.log.euler_angles import tilt_deg
 from mission.review.logged_flight import LoggedFlight
 from mission.review.panels.sensors import gnss_topic
 from mission.review.timeline import Timeline
@@ -123,8 +123,7 @@ def _tilt(flight: LoggedFlight, timeline: Timeline) -> str:
     rows = rows[np.isfinite(rows).all(axis=1)]
     if not len(rows):
         return ""
-    roll, pitch, _ = euler_rad(rows[:, [1, 2, 3, 0]]).T
-    return f"{np.degrees(np.arccos(np.clip(np.cos(roll) * np.cos(pitch), -1.0, 1.0)).max()):.0f} deg"
+    return f"{tilt_deg(rows[:, [1, 2, 3, 0]]).max():.0f} deg"
 
 
 def _duration(seconds: float) -> str:

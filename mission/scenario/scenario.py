@@ -4,12 +4,12 @@ A file `NAME.scenario.yaml` is one of these written down (`scenario_file.py`); P
 flown by `runner.run_scenario`. Light to import.
 """
 
-import difflib
 from pathlib import Path
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from common.config.refusal import meant_or_known
 from mission.flight_settings import EngineName, Pace
 from mission.scenario.parts.checks import Check
 from mission.scenario.parts.faults import Fault
@@ -196,9 +196,9 @@ class Scenario(Part):
         for number, check in enumerate(self.checks):
             for end in (check.from_, check.to):
                 if isinstance(end, str) and end not in known and not end.startswith(ITEM_MARK):
-                    near = difflib.get_close_matches(end, known, n=1)
-                    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(sorted(known)) or 'none'}"
-                    raise ValueError(f"checks[{number}]: nothing makes a mark '{end}'; {hint}")
+                    raise ValueError(
+                        f"checks[{number}]: nothing makes a mark '{end}'; {meant_or_known(end, sorted(known))}"
+                    )
 
     @property
     def needs_learn(self) -> bool:

@@ -11,12 +11,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from common.intervals import wilson_interval
 from policies.learn.networks.policy import Policy
 from policies.learn.rollout.task_tensors import TaskTensors
 from policies.learn.torch_threads import few_threads
 from policies.tasks.catalogue import build_task
 from policies.tasks.episode import Outcome
-from policies.tasks.intervals import wilson_interval
 from policies.tasks.task import Task, TaskSettings
 from policies.tasks.task_params import Sampler
 

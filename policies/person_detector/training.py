@@ -17,9 +17,9 @@ from rich.progress import track
 from torch import Tensor
 from torch.nn import functional
 
+from common.intervals import rate
 from policies.person_detector.detector import WEIGHTS, DetectorNetwork, shipped
 from policies.person_detector.scenes import Scenes, scenes
-from policies.tasks.intervals import rate
 
 BATCH = 128
 RATE = 2e-3

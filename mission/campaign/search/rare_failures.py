@@ -11,11 +11,11 @@ from math import sqrt
 import numpy as np
 import numpy.typing as npt
 
+from common.intervals import Z_95
 from mission.campaign.campaign import SEED_KEY, Campaign, Rare
 from mission.campaign.flying import Flights
 from mission.campaign.runs import Record
 from mission.campaign.sampling import draw, order_at, stream
-from mission.campaign.statistics import Z_95
 
 LEVELS = 5
 ELITE = 0.1  # of a level, unless more fail

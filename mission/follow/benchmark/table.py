@@ -5,10 +5,10 @@ from math import isnan
 
 import numpy as np
 
+from common.intervals import Interval, bootstrap, rate
 from mission.follow.benchmark.conditions import Condition
 from mission.follow.benchmark.flights import Outcome
 from policies.tasks.follow_me.scorecard import written
-from policies.tasks.intervals import Interval, bootstrap, rate
 
 COLUMNS = (
     "condition", "flights", "in band", "no collision", "nearest", "stood", "resumed", "changed / min", "accel",

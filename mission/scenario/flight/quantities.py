@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mission.flight_base import FlightBase
-from mission.log.euler_angles import euler_rad
+from mission.log.euler_angles import euler_rad, tilt_deg
 from mission.log.flight_recorder import History
 from mission.log.flight_summary import rotation_error_ned
 from mission.scenario.parts.conditions import Term
@@ -22,27 +22,15 @@ Rows = npt.NDArray[Any]
 
 
 @dataclass(slots=True)
-class Moments:
+class Moments(History):
     """The state of a vehicle at some moments, and the world it is in."""
 
-    time_us: Rows
-    pos_ned_true: Rows
-    vel_ned_true: Rows
-    q_true: Rows
-    pos_ned_est: Rows
-    vel_ned_est: Rows
-    q_est: Rows
-    is_armed: Rows
-    mission_seq: Rows
-    battery_remaining: Rows
-    airspeed: Rows
     world: WorldMap
 
 
 def moments_of(history: History, world: WorldMap) -> Moments:
     """Those of a whole flight."""
-    columns = {each.name: getattr(history, each.name) for each in fields(Moments) if each.name != "world"}
-    return Moments(**columns, world=world)
+    return Moments(**{each.name: getattr(history, each.name) for each in fields(history)}, world=world)
 
 
 def moment_of(flight: FlightBase) -> Moments:
@@ -62,18 +50,12 @@ def moment_of(flight: FlightBase) -> Moments:
         vel_ned_est=row(estimate.vel_ned),
         q_est=row(estimate.q_ned_from_frd),
         is_armed=np.array([state.is_armed]),
+        mode=np.array([int(state.mode)]),
         mission_seq=np.array([state.mission_current]),
         battery_remaining=np.array([state.battery_remaining]),
         airspeed=np.array([getattr(estimate, "airspeed", np.nan)]),
         world=flight.world,
     )
-
-
-def tilt_deg(q: Rows) -> Rows:
-    """Angle between body down and down; (x, y, z, w) rows."""
-    x, y = q[:, :2].astype(float).T
-    angles: Rows = np.degrees(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
-    return angles
 
 
 def _euler(q: Rows, axis: int) -> Rows:

@@ -4,12 +4,13 @@ QUANTITY OP NUMBER, joined by `and`. Which quantities there are, with their unit
 are worth in a flight is in `quantities.py`. Light to import.
 """
 
-import difflib
 import re
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import AfterValidator
+
+from common.config.refusal import nearest
 
 QUANTITIES: dict[str, tuple[str, str]] = {
     "time": ("s", "simulated time since power-on"),
@@ -75,9 +76,8 @@ def terms_of(text: str) -> tuple[Term, ...]:
             raise ValueError(f"'{text}': a condition is {_FORM}")
         name, operator, number = found.groups()
         if name not in QUANTITIES:
-            near = difflib.get_close_matches(name, QUANTITIES, n=1)
-            hint = f"did you mean {near[0]}? " if near else ""
-            raise ValueError(f"'{name}': no such quantity; {hint}There are {', '.join(QUANTITIES)}")
+            hint = nearest(name, QUANTITIES)
+            raise ValueError(f"'{name}': no such quantity; {hint}{' ' * bool(hint)}There are {', '.join(QUANTITIES)}")
         try:
             terms.append(Term(name, operator, float(number)))
         except ValueError:

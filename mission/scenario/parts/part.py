@@ -4,14 +4,13 @@ In YAML `takeoff: 10` means `takeoff: {height_m: 10}`, and a step or check that 
 published schema says the same. Light to import.
 """
 
-import difflib
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from common.config.refusal import shown
+from common.config.refusal import meant_or_known, shown
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Metres = Annotated[float, Field(ge=0.0, le=100_000.0)]
@@ -60,9 +59,7 @@ class OneOf(Part):
     def _from_name(cls, given: Any) -> Any:
         if isinstance(given, str):
             if given not in cls.model_fields:
-                near = difflib.get_close_matches(given, cls.names(), n=1)
-                hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(cls.names())}"
-                raise ValueError(f"unknown {cls.what} {shown(given)}; {hint}")
+                raise ValueError(f"unknown {cls.what} {shown(given)}; {meant_or_known(given, cls.names())}")
             return {given: {}}
         if isinstance(given, dict):
             return {key: {} if value is None and key in cls.model_fields else value for key, value in given.items()}

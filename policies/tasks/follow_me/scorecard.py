@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from common.intervals import Interval, bootstrap, rate
 from policies.tasks.follow_me.track import Loss, Ranges, Track, losses
-from policies.tasks.intervals import Interval, bootstrap, rate
 
 
 @dataclass(frozen=True, slots=True)

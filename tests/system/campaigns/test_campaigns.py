@@ -55,18 +55,15 @@ def runs_in(folder):
     return [json.loads(line) for line in (folder / "runs.jsonl").read_text().splitlines()]
 
 
+def command(file, folder):
+    program = "from mission.cli import main; main()"
+    return [sys.executable, "-c", program, "campaign", str(file), "--folder", str(folder)]
+
+
 def test_a_campaign_killed_on_the_way_goes_on_and_flies_nothing_twice(tmp_path):
     file, folder = tmp_path / "hop.campaign.yaml", tmp_path / "out"
     file.write_text(HOP)
-    line = [
-        sys.executable,
-        "-c",
-        "from mission.cli import main; main()",
-        "campaign",
-        str(file),
-        "--folder",
-        str(folder),
-    ]
+    line = command(file, folder)
     process = subprocess.Popen([*line, "--jobs", "2"], cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         while process.poll() is None and not ((folder / "runs.jsonl").exists() and len(runs_in(folder)) >= 2):
@@ -208,15 +205,7 @@ def test_ray_loses_no_run_when_a_worker_dies_and_says_when_its_head_does(tmp_pat
     pytest.importorskip("ray", reason="needs the extra 'ray'")
     file, folder = tmp_path / "hop.campaign.yaml", tmp_path / "out"
     file.write_text(HOP)
-    line = [
-        sys.executable,
-        "-c",
-        "from mission.cli import main; main()",
-        "campaign",
-        str(file),
-        "--folder",
-        str(folder),
-    ]
+    line = command(file, folder)
     head = Head()
     try:
         process = subprocess.Popen([*line, "--ray", RAY_HEAD], cwd=ROOT, stdout=subprocess.PIPE, text=True)

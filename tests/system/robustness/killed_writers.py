@@ -18,8 +18,8 @@ from pyulog import ULog
 from autopilot.interface.item_lists import ListKind, MissionItem
 from autopilot.params import parameter_table
 from autopilot.persistence import Persistence
+from common.logs.ulog import UlogWriter
 from common.state_folder import StateFolder
-from common.ulog import UlogWriter
 from mission.log.stored_logs import FlightLogs
 from tests.unit.autopilot.test_persistence import Lists
 

@@ -1,10 +1,8 @@
 """A disk that is full in the middle of a flight: it is told once, and flown on to the landing."""
 
 import os
-import resource
 import subprocess
 import sys
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -15,24 +13,11 @@ from common.clock import SIMULATED_EPOCH_US
 from common.state_folder import StateFolder
 from mission.flight import Flight, FlightConfig
 from sim.world.world import WorldConfig
+from tests.small_files import files_of_at_most
 
 HONEYGUIDE = Path(sys.executable).with_name("honeyguide")
 ROOM_BYTES = 64  # less than any file of a flight
 ENDED = ("flight.ulg ended", "flight.tlog ended", "log_00001.ulg ended", "Signing key and time not stored")
-
-
-@contextmanager
-def no_room():
-    """Inside, no file of this process may grow beyond a few bytes: writing to it is an OSError, as on a full disk."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    kept = sys.dont_write_bytecode
-    sys.dont_write_bytecode = True  # of modules that are imported meanwhile: it would be cut off, and stay so
-    resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM_BYTES, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        sys.dont_write_bytecode = kept
 
 
 def signed_flight(folder):
@@ -61,7 +46,7 @@ def test_flight_goes_on_to_its_landing_when_the_disk_is_full(tmp_path):
 
     assert flight.fly(climb, seconds=100.0).error is None
     count = flight.texts.count
-    with no_room():
+    with files_of_at_most(ROOM_BYTES):
         running = flight.fly(fly_on, seconds=200.0)
         history = flight.close()
     state.close()
@@ -78,7 +63,7 @@ def test_flight_goes_on_to_its_landing_when_the_disk_is_full(tmp_path):
 def test_the_signing_clock_is_stored_once_there_is_room_again(tmp_path):
     flight, state = signed_flight(tmp_path)
     store = FileStore(tmp_path / "signing.json")
-    with no_room():
+    with files_of_at_most(ROOM_BYTES):
         flight.fly(lambda drone: drone.sleep(70.0))
         before = store.load().timestamp
     flight.fly(lambda drone: drone.sleep(15.0))

@@ -9,10 +9,10 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import all as mavlink
 from pyulog import ULog
 
-from common import log_file
-from common.log_file import PARTS_KEPT_MAX, LogFile
-from common.tlog import TlogWriter
-from common.ulog import UlogWriter
+from common.logs import log_file
+from common.logs.log_file import PARTS_KEPT_MAX, LogFile
+from common.logs.tlog import TlogWriter
+from common.logs.ulog import UlogWriter
 
 
 class FullDisk(BytesIO):

@@ -4,7 +4,7 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import common as mavlink
 
 from common.clock import SIMULATED_EPOCH_US
-from common.tlog import TlogWriter
+from common.logs.tlog import TlogWriter
 
 
 def heartbeat(sender, custom_mode):

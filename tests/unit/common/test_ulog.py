@@ -7,7 +7,7 @@ import pytest
 from pyulog import ULog
 
 from common.files import part_path
-from common.ulog import SYNC_EVERY_BYTES, SYNC_MAGIC, UlogWriter
+from common.logs.ulog import SYNC_EVERY_BYTES, SYNC_MAGIC, UlogWriter
 
 FIELDS = {"x": "float", "q": "float[4]", "xy_valid": "bool", "ref_timestamp": "uint64_t", "delta": "int64_t"}
 INFO = {"sys_name": "Honeyguide", "ver_sw_release": 0x00_01_00_FF, "boot": ["one", "two"]}

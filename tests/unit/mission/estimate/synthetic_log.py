@@ -4,7 +4,7 @@ import numpy as np
 
 from common.geodesy import GeoPoint, geodetic_from_ned
 from common.geomagnetic import field_ned_gauss
-from common.ulog import UlogWriter
+from common.logs.ulog import UlogWriter
 
 GRAVITY = 9.80665
 HOME = GeoPoint(47.397742, 8.545594, 488.0)

@@ -255,7 +255,7 @@ def test_log_of_an_idle_vehicle_thins_out_until_somebody_listens(tmp_path):
 
 
 def test_log_of_a_long_flight_goes_on_in_parts_that_clients_can_download(tmp_path, monkeypatch):
-    monkeypatch.setattr("common.log_file.PART_BYTES_MAX", 400_000)
+    monkeypatch.setattr("common.logs.log_file.PART_BYTES_MAX", 400_000)
     flight = Flight(FlightConfig(world=WorldConfig(size_m=64.0, trees_per_ha=0.0)), folder=tmp_path)
     flight.fly(lambda drone: drone.sleep(15.0))
     stored = flight.host.logs

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from common.ulog import UlogWriter
+from common.logs.ulog import UlogWriter
 
 START_US = 100_000_000
 SECONDS = 20.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from common.ulog import UlogWriter
+from common.logs.ulog import UlogWriter
 from mission.review.curves import POINTS_MAX, thinned
 from mission.review.flight_review import review_flight
 from mission.review.innovations import ratios

@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from autopilot.interface.vehicle_state import Mode
+from common.intervals import Interval
 from mission.console.option_checks import UserError
 from mission.flight_settings import WORLD_KINDS
 from mission.scenario.flight.building import flight_configs
@@ -18,7 +19,6 @@ from mission.scenario.parts.steps import ModeName, Step, Takeoff
 from mission.scenario.scenario import Scenario, World, WorldName
 from mission.scenario.scenario_file import READY, find_files, parse_scenario, read_scenario
 from policies.tasks.follow_me.scorecard import Scorecard
-from policies.tasks.intervals import Interval
 from sim.faults import BIAS_UNITS
 from sim.world.world import WorldConfig
 

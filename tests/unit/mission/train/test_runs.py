@@ -3,7 +3,6 @@
 import json
 import os
 import random
-import resource
 import signal
 import subprocess
 import threading
@@ -16,6 +15,7 @@ import torch
 from policies.learn.checkpoint import checkpoints, load
 from policies.learn.config.load import load_config
 from policies.learn.export.policy_file import load_policy
+from tests.small_files import files_of_at_most
 from tests.unit.mission.train.training_run import RUN, honeyguide, in_process, train, write_config
 
 
@@ -155,12 +155,8 @@ def test_full_disk_ends_with_one_sentence_and_leaves_the_last_checkpoint():
     before = {path: path.read_bytes() for path in RUN.rglob("*.pt")}
     write_config()
     size = max(len(content) for content in before.values()) - 1000
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
-    try:
+    with files_of_at_most(size):
         result = train("--resume")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert result.exit_code == 2
     assert result.stderr == "honeyguide: results/run/Ball/Ball-4096.pt: cannot be written: File too large\n"
     assert {path: path.read_bytes() for path in RUN.rglob("*.pt")} == before

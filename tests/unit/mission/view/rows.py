@@ -5,7 +5,7 @@ import json
 import numpy as np
 
 from autopilot.interface.vehicle_state import Mode
-from common.ulog import UlogWriter
+from common.logs.ulog import UlogWriter
 from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
 from mission.log.motion_topics import TRUE_LOCAL_POSITION_FIELDS

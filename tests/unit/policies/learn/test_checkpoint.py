@@ -1,8 +1,6 @@
 """Checkpoints: exact, whole or not there, and never a program."""
 
 import pickle
-import resource
-import signal
 import subprocess
 import sys
 
@@ -12,6 +10,7 @@ import torch
 
 from policies.learn.checkpoint import checkpoint_path, checkpoints, load, prune, save
 from policies.learn.export.policy_path import CheckpointError
+from tests.small_files import files_of_at_most
 
 CONTENT = {
     "steps": 7,
@@ -108,15 +107,11 @@ def test_full_disk_leaves_the_old_file_and_no_half(tmp_path):
     path = tmp_path / "a.pt"
     save(path, CONTENT, "checkpoint")
     before = path.read_bytes()
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, limits[1]))
-    try:
-        with pytest.raises(CheckpointError, match=r"a\.pt: cannot be written: File too large"):
-            save(path, {"weights": torch.zeros(1_000_000)}, "checkpoint")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-        signal.signal(signal.SIGXFSZ, handler)
+    with (
+        files_of_at_most(100_000),
+        pytest.raises(CheckpointError, match=r"a\.pt: cannot be written: File too large"),
+    ):
+        save(path, {"weights": torch.zeros(1_000_000)}, "checkpoint")
     assert path.read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == ["a.pt"]
 

@@ -18,7 +18,7 @@ from autopilot.mavlink.services.files.log_streaming import (
     RESEND_US,
     PieceCutter,
 )
-from common.ulog import UlogWriter
+from common.logs.ulog import UlogWriter
 from tests.unit.autopilot.mavlink.rig import FRAME_US, Rig, texts
 
 START, STOP = mavlink.MAV_CMD_LOGGING_START, mavlink.MAV_CMD_LOGGING_STOP

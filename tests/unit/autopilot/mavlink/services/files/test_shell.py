@@ -10,7 +10,7 @@ from autopilot.interface.item_lists import MissionItem
 from autopilot.interface.platform import LogFile
 from autopilot.interface.vehicle_state import Reply, Verdict
 from autopilot.mavlink.services.files.shell import PIECES_PER_FRAME, PROMPT
-from common.ulog import UlogWriter
+from common.logs.ulog import UlogWriter
 from tests.unit.autopilot.mavlink.rig import Client, Rig
 
 SHELL = mavlink.SERIAL_CONTROL_DEV_SHELL

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-_Z95 = 1.959964  # two-sided 95 % of a normal distribution
+Z_95 = 1.959963984540054  # two-sided 95 % of a normal distribution
 _RESAMPLES = 2000  # Efron and Tibshirani 1993, ch. 13: 1,000 or more for percentile intervals
 
 
@@ -25,10 +25,11 @@ def wilson_interval(successes: int, count: int) -> tuple[float, float]:
     if count == 0:
         return 0.0, 1.0
     rate = successes / count
-    shrink = 1.0 + _Z95**2 / count
-    middle = (rate + _Z95**2 / (2.0 * count)) / shrink
-    half = _Z95 / shrink * math.sqrt(rate * (1.0 - rate) / count + _Z95**2 / (4.0 * count**2))
-    return max(0.0, middle - half), min(1.0, middle + half)
+    shrink = 1.0 + Z_95**2 / count
+    middle = (rate + Z_95**2 / (2.0 * count)) / shrink
+    half = Z_95 / shrink * math.sqrt(rate * (1.0 - rate) / count + Z_95**2 / (4.0 * count**2))
+    low = 0.0 if successes == 0 else max(0.0, middle - half)
+    return low, 1.0 if successes == count else min(1.0, middle + half)
 
 
 def rate(is_success: NDArray[np.bool_]) -> Interval:

@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from common.log_file import LogFile
+from common.logs.log_file import LogFile
 
 MAGIC = b"ULog\x01\x12\x35\x01"  # and the version, 1
 SYNC_MAGIC = bytes((0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, t
 
-from policies.tasks.intervals import bootstrap, rate, wilson_interval
+from common.intervals import bootstrap, rate, wilson_interval
 
 
 @pytest.mark.parametrize(("successes", "count"), [(0, 10), (10, 10), (997, 1000), (1, 3)])

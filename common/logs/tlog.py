@@ -9,7 +9,7 @@ from struct import Struct
 from typing import BinaryIO
 
 from common.clock import SIMULATED_EPOCH_US
-from common.log_file import LogFile, OnTrouble
+from common.logs.log_file import LogFile, OnTrouble
 
 _TIME = Struct(">Q")
 _BATCH = 512  # pieces that are written at once: a flight has hundreds of frames per second
