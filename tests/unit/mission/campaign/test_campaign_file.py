@@ -1,6 +1,8 @@
 """Campaign files: what is wrong is said in one sentence with file, line and key."""
 
 import pytest
+import yaml
+from jsonschema import Draft202012Validator
 
 from mission.campaign.campaign_file import read_campaign
 from mission.campaign.schema import campaign_schema, reference_text
@@ -94,3 +96,15 @@ def test_no_campaign_is_taken_for_a_scenario(tmp_path):
     (tmp_path / "hop.campaign.yaml").write_text(CAMPAIGN)
     with pytest.raises(UserError, match="holds no"):
         find_files([tmp_path])
+
+
+@pytest.mark.parametrize(
+    "path",
+    sorted((ROOT / "mission/campaign/ready").glob("*.campaign.yaml")),
+    ids=lambda path: path.name.partition(".")[0],
+)
+def test_the_reference_validator_takes_what_ships_and_refuses_a_wrong_key(path):
+    validator = Draft202012Validator(campaign_schema())
+    given = yaml.safe_load(path.read_text(encoding="utf-8"))
+    assert validator.is_valid(given)
+    assert not validator.is_valid({**given, "runz": 3})
