@@ -11,6 +11,7 @@ from mission.scenario.scenario import Scenario
 from mission.scenario.scenario_file import find_files
 from tests.documents import ROOT
 
+SHIPPED = sorted((ROOT / "mission/campaign/ready").glob("*.campaign.yaml"))
 CAMPAIGN = """runs: 10
 scenario:
   world: {kind: plain}
