@@ -5,12 +5,11 @@ import pytest
 import warp as wp
 
 from bench.flying.fleet import hovering
+from bench.flying.gpu import GPU, TRACKED
 from bench.learning.environments import random_actions
 from common.warp_start import start_warp
 from policies.tasks.catalogue import build_task, task_settings
 
-GPU = "cuda:0"
-TRACKED = {"observation": "tracked", "has_estimator": False, "owner": "any", "terrain": "kept", "stack": 3}
 TASKS = {
     "RollerBall": {},
     "ReachTarget": {},

@@ -76,8 +76,10 @@ def terms_of(text: str) -> tuple[Term, ...]:
             raise ValueError(f"'{text}': a condition is {_FORM}")
         name, operator, number = found.groups()
         if name not in QUANTITIES:
-            hint = nearest(name, QUANTITIES)
-            raise ValueError(f"'{name}': no such quantity; {hint}{' ' * bool(hint)}There are {', '.join(QUANTITIES)}")
+            known = f"There are {', '.join(QUANTITIES)}"
+            raise ValueError(
+                f"'{name}': no such quantity; {' '.join(filter(None, (nearest(name, QUANTITIES), known)))}"
+            )
         try:
             terms.append(Term(name, operator, float(number)))
         except ValueError:
