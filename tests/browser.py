@@ -126,13 +126,14 @@ class Browser:
             self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=count)
 
     def click_button(self, text: str) -> None:
-        """The button with this text."""
-        place = self.wait(
+        """The button with this text, when nothing covers it; found and clicked in one step, since pages move."""
+        self.wait(
             f"(() => {{ const b = [...document.querySelectorAll('button')].find(b => b.innerText.trim() === {text!r});"
-            " if (!b) return null; b.scrollIntoView({block: 'center'}); const r = b.getBoundingClientRect();"
-            " return [r.x + r.width / 2, r.y + r.height / 2]; })()"
+            " if (!b || b.disabled) return false; b.scrollIntoView({block: 'center'});"
+            " const r = b.getBoundingClientRect();"
+            " const on_top = document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2);"
+            " if (!b.contains(on_top)) return false; b.click(); return true; })()"
         )
-        self.click(*place)
 
     def picture(self) -> np.ndarray:
         """What the window shows, RGB."""
