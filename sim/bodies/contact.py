@@ -3,7 +3,8 @@
 In: pose and motion, each 1 ms. Out: force and torque. The surroundings are looked up once a tick and treated as a
 plane for its four substeps. Feet and rotor tips touch the ground; one sphere round the vehicle touches obstacles.
 Feet stick by a tangential spring each (a bristle), so a vehicle on a slope does not creep; rotor tips only drag.
-Left out: terrain curvature under one vehicle, torque from obstacles, deformation that stays.
+They stand on the level top of another vehicle too, and ride with it.
+Left out: terrain curvature under one vehicle, torque from obstacles, the tilt of a top, deformation that stays.
 """
 
 import math
@@ -15,7 +16,7 @@ from common.airframes.multirotor import MultirotorAirframe
 from common.geodesy import GRAVITY_M_S2
 from common.kernels import MAX_MOTORS, vec8
 from sim.world.custom.solids import solids_gap, solids_hit
-from sim.world.neighbours import neighbour_touched
+from sim.world.neighbours import deck_below, deck_vel, is_over_deck, neighbour_box, neighbour_touched
 from sim.world.world import World, ground_height, ground_normal_ned, obstacle_contact
 
 wp.set_module_options({"enable_backward": False})
@@ -69,6 +70,9 @@ class Surroundings:
     leg_normal_y: Vec12
     leg_normal_z: Vec12
     leg_offset_m: Vec12  # of each surface's plane along its normal, from where it was looked up
+    deck_legs: int  # a bit of each leg whose surface is the top of another vehicle
+    deck_vel_ned: wp.vec3  # [m/s] of that top, where it was looked up
+    deck_turn_rate: float  # [rad/s]
 
 
 @wp.struct
@@ -102,14 +106,18 @@ def look_around(world: World, model: ContactModel, pos_ned: wp.vec3) -> Surround
     if around.height_agl_m < _NEAR_FACTOR * model.reach_m + _OBSTACLE_MARGIN_M:
         around.is_near_ground = 1
         around.normal_ned = ground_normal_ned(world, pos_ned[0], pos_ned[1])
-    touch = obstacle_contact(world, pos_ned, model.hull_radius_m + _OBSTACLE_MARGIN_M)
+    bare = world
+    if world.neighbours.count > 0:
+        if deck_below(world.neighbours, world.boxes.tick, pos_ned, model.hull_radius_m + _OBSTACLE_MARGIN_M) >= 0:
+            bare.neighbours.count = 0  # its feet stand there, not its hull
+    touch = obstacle_contact(bare, pos_ned, model.hull_radius_m + _OBSTACLE_MARGIN_M)
     if touch[3] > 0.0:
         around.is_near_obstacle = 1
         around.obstacle_normal_ned = wp.vec3(touch[0], touch[1], touch[2])
         around.obstacle_depth_m = touch[3] - _OBSTACLE_MARGIN_M
         around.obstacle_rigidity = 1.0
         seen_m = model.hull_radius_m + _OBSTACLE_MARGIN_M
-        other = neighbour_touched(world.neighbours, world.boxes.tick, pos_ned, seen_m, touch[3])
+        other = neighbour_touched(bare.neighbours, world.boxes.tick, pos_ned, seen_m, touch[3])
         if other >= 0:
             stiffness_n_m = world.neighbours.rows[other].stiffness_n_m
             around.obstacle_vel_ned = world.neighbours.rows[other].vel_ned
@@ -135,6 +143,31 @@ def look_along_legs(world: World, model: ContactModel, around: Surroundings, r_n
         around.leg_offset_m[point] = -_NOWHERE_M
         if hit.face >= 0:
             around.leg_offset_m[point] = hit.t * wp.dot(hit.normal_ned, along_ned)
+    return around
+
+
+@wp.func
+def look_at_deck(world: World, model: ContactModel, around: Surroundings, r_ned_from_frd: wp.mat33) -> Surroundings:
+    """The surroundings with the level top of a vehicle straight below for a surface, of the legs that are over it."""
+    tick = world.boxes.tick
+    deck = deck_below(world.neighbours, tick, around.origin_ned, model.reach_m + _OBSTACLE_MARGIN_M)
+    if deck < 0:
+        return around
+    one = world.neighbours.rows[deck]
+    around.deck_vel_ned = deck_vel(one, tick, around.origin_ned)
+    around.deck_turn_rate = one.turn_rate
+    offset_m = around.origin_ned[2] + neighbour_box(one, tick).high
+    for point in range(model.point_count):
+        if around.is_near_solid == 0:
+            around.leg_offset_m[point] = -_NOWHERE_M
+        end_ned = around.origin_ned + r_ned_from_frd * contact_point_frd(model, point)
+        if offset_m > around.leg_offset_m[point] and is_over_deck(one, tick, end_ned):
+            around.leg_normal_x[point] = 0.0
+            around.leg_normal_y[point] = 0.0
+            around.leg_normal_z[point] = -1.0
+            around.leg_offset_m[point] = offset_m
+            around.deck_legs += 1 << point
+    around.is_near_solid = 1
     return around
 
 
@@ -196,6 +229,7 @@ def ground_contact(
     ground_ned = around.origin_ned + wp.vec3(0.0, 0.0, around.height_agl_m)
     height = wp.dot(normal, pos_ned - ground_ned)
     for point in range(model.point_count):
+        is_on_deck = bool(False)
         arm_frd = contact_point_frd(model, point)
         depth = -height - wp.dot(around.normal_ned, r_ned_from_frd * arm_frd)
         if around.is_near_solid == 1:
@@ -206,8 +240,13 @@ def ground_contact(
             if leg_depth > depth:
                 depth = leg_depth
                 normal = surface
+                is_on_deck = (around.deck_legs >> point) % 2 == 1
         if depth > 0.0:
             point_vel_ned = vel_ned + r_ned_from_frd * wp.cross(omega_frd, arm_frd)
+            if is_on_deck:
+                arm_ned = r_ned_from_frd * arm_frd
+                turning_ned = around.deck_turn_rate * wp.vec3(-arm_ned[1], arm_ned[0], 0.0)
+                point_vel_ned -= around.deck_vel_ned + turning_ned
             normal_speed = wp.dot(normal, point_vel_ned)
             tangent_vel_ned = point_vel_ned - normal * normal_speed
             normal_force = wp.max(model.normal_n_m * depth - model.normal_n_s_m * normal_speed, 0.0)

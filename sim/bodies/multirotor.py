@@ -19,6 +19,7 @@ from sim.bodies.contact import (
     ground_contact,
     look_along_legs,
     look_around,
+    look_at_deck,
     obstacle_force,
 )
 from sim.bodies.multirotor_model import MultirotorModel
@@ -263,6 +264,9 @@ def step_inputs(
         inputs.height_agl_m = -body.pos_ned[2] - surface_height(world, body.pos_ned)
         rot = wp.quat_to_matrix(body.q_ned_from_frd)
         inputs.around = look_along_legs(world, model.contact, inputs.around, rot)
+    if world.neighbours.count > 0:
+        rot = wp.quat_to_matrix(body.q_ned_from_frd)
+        inputs.around = look_at_deck(world, model.contact, inputs.around, rot)
     inputs.density_ratio = density_ratio(model, body.pos_ned[2])
     inputs.rotor_inertia_rate = model.rotor_inertia_kg_m2 / dt
     inputs.gain_up = lag_gain(model.spin_up_time_s, dt)

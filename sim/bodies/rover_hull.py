@@ -4,6 +4,7 @@ In: pose and motion, each 1 ms. Out: force and torque. The surroundings are look
 for its four substeps: one for the ground, and one for each point of the outline that is near an obstacle. The outline
 is ten balls round the box at the height of the hubs, so that corners, sides and ends are stopped and turned: a small
 one at each corner, and six between that slide along their side to where the obstacle is nearest, each tick anew.
+Left out: the weight and the drag of who stands on it.
 """
 
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import warp as wp
 
 from sim.bodies.rover_model import RoverModel
-from sim.world.neighbours import neighbour_touched
+from sim.world.neighbours import carries, neighbour_touched
 from sim.world.world import World, obstacle_contact, surface_height
 
 wp.set_module_options({"enable_backward": False})
@@ -102,9 +103,19 @@ def most_slide(model: RoverModel, point: int) -> float:
 
 
 @wp.func
+def without_load(model: RoverModel, world: World, pos_ned: wp.vec3) -> World:
+    """The world without other vehicles, while one stands on it: of that it feels nothing."""
+    bare = world
+    if world.neighbours.count > 0:
+        if carries(world.neighbours, world.boxes.tick, pos_ned, model.hull_top_m, model.hull_reach_m):
+            bare.neighbours.count = 0
+    return bare
+
+
+@wp.func
 def is_near_obstacle(model: RoverModel, world: World, pos_ned: wp.vec3) -> int:
     """Whether a trunk, crown or wall may be reached within a tick."""
-    touch = obstacle_contact(world, pos_ned, model.hull_reach_m + _MARGIN_M)
+    touch = obstacle_contact(without_load(model, world, pos_ned), pos_ned, model.hull_reach_m + _MARGIN_M)
     if touch[3] > 0.0:
         return 1
     return 0
@@ -125,6 +136,7 @@ def look_at_hull(
     `is_near`: an obstacle may be touched.
     """
     hull = HullContact()
+    bare = without_load(model, world, pos_ned)
     ground_m = surface_height(world, pos_ned)
     hull.height_agl_m = -pos_ned[2] - ground_m
     hull.normal_ned = normal_ned
@@ -141,22 +153,22 @@ def look_at_hull(
     if is_near == 1:
         hull.other_rigidity = 1.0
         reach_m = model.hull_reach_m + _MARGIN_M
-        other = neighbour_touched(world.neighbours, world.boxes.tick, pos_ned, reach_m, 0.0)
+        other = neighbour_touched(bare.neighbours, world.boxes.tick, pos_ned, reach_m, 0.0)
         if other >= 0:  # whatever else is touched in this tick is taken to move and to yield as it does
-            stiffness_n_m = world.neighbours.rows[other].stiffness_n_m
-            hull.other_vel_ned = world.neighbours.rows[other].vel_ned
+            stiffness_n_m = bare.neighbours.rows[other].stiffness_n_m
+            hull.other_vel_ned = bare.neighbours.rows[other].vel_ned
             hull.other_rigidity = stiffness_n_m / (stiffness_n_m + model.scrape_n_m)  # springs in series
         for point in range(int(_POINTS)):
             centre_ned = pos_ned + wp.quat_rotate(q_ned_from_frd, outline_frd(model, point))
             most_m = most_slide(model, point)
             seen_m = ball_radius(model, point) + _MARGIN_M
-            touch = obstacle_contact(world, centre_ned, seen_m + most_m)
+            touch = obstacle_contact(bare, centre_ned, seen_m + most_m)
             if touch[3] > 0.0 and most_m > 0.0:
                 to_obstacle_ned = (touch[3] - seen_m - most_m) * wp.vec3(touch[0], touch[1], touch[2])
                 along_ned = wp.quat_rotate(q_ned_from_frd, slide_frd(point))
                 hull.slid_m[point] = wp.clamp(wp.dot(along_ned, to_obstacle_ned), -most_m, most_m)
                 centre_ned += hull.slid_m[point] * along_ned
-                touch = obstacle_contact(world, centre_ned, seen_m)
+                touch = obstacle_contact(bare, centre_ned, seen_m)
             normal = wp.vec3(touch[0], touch[1], touch[2])
             hull.normal_x[point] = normal[0]
             hull.normal_y[point] = normal[1]

@@ -33,6 +33,7 @@ class Neighbour:
     vel_ned: wp.vec3  # [m/s]
     cos_yaw: float
     sin_yaw: float
+    turn_rate: float  # [rad/s] of its heading
     half_length: float  # [m] of a box, along its heading; of a ball its radius
     half_width: float
     half_height: float
@@ -144,6 +145,47 @@ def neighbour_touched(others: Neighbours, tick: int, pos_ned: wp.vec3, radius: f
     return touched
 
 
+@wp.func
+def deck_below(others: Neighbours, tick: int, pos_ned: wp.vec3, within_m: float) -> int:
+    """Which of the others, a box, is straight below a point, its top nearer than so much [m]; -1: none."""
+    below = int(-1)
+    for i in range(others.count):
+        if i != others.i_own and others.rows[i].is_ball == 0:
+            gap_m = -pos_ned[2] - neighbour_box(others.rows[i], tick).high
+            if gap_m > 0.0 and gap_m < within_m and is_over_deck(others.rows[i], tick, pos_ned):
+                below = i
+    return below
+
+
+@wp.func
+def is_over_deck(one: Neighbour, tick: int, pos_ned: wp.vec3) -> bool:
+    """Whether a point is within the ground plan of a box."""
+    off = pos_ned - neighbour_pos(one, tick)
+    ahead = one.cos_yaw * off[0] + one.sin_yaw * off[1]
+    right = one.cos_yaw * off[1] - one.sin_yaw * off[0]
+    return wp.abs(ahead) <= one.half_length and wp.abs(right) <= one.half_width
+
+
+@wp.func
+def deck_vel(one: Neighbour, tick: int, pos_ned: wp.vec3) -> wp.vec3:
+    """How a point that rides on a box moves [m/s]."""
+    off = pos_ned - neighbour_pos(one, tick)
+    return one.vel_ned + one.turn_rate * wp.vec3(-off[1], off[0], 0.0)
+
+
+@wp.func
+def carries(others: Neighbours, tick: int, pos_ned: wp.vec3, top_m: float, reach_m: float) -> bool:
+    """Whether something that flies is over a vehicle, whose top is so high, within its reach: it may stand there."""
+    is_laden = bool(False)
+    for i in range(others.count):
+        if i != others.i_own and others.rows[i].is_ball == 1:
+            off = neighbour_pos(others.rows[i], tick) - pos_ned
+            gap_m = -off[2] - top_m
+            if gap_m > 0.0 and gap_m < others.rows[i].half_length and off[0] * off[0] + off[1] * off[1] < reach_m * reach_m:
+                is_laden = True
+    return is_laden
+
+
 @dataclass(frozen=True, slots=True)
 class Outline:
     """What others meet of a vehicle: a ball, or a box about a point of its own."""
@@ -217,6 +259,7 @@ class NeighbourTable:
             rows["pos_ned"][i] = (north + ahead * cos_yaw, east + ahead * sin_yaw, down - outline.above_m)
             rows["vel_ned"][i] = now["vel_ned"]
             rows["cos_yaw"][i], rows["sin_yaw"][i] = cos_yaw, sin_yaw
+            rows["turn_rate"][i] = now["omega_frd"][2]
             rows["tick"][i] = int(tick[0]) & TICK_MASK
 
     def near(self) -> set[int]:

@@ -38,7 +38,7 @@ def test_shipped_airframes_are_known_and_others_refused():
     assert set(airframe_names()) >= {"x500", "f450"}
     with pytest.raises(
         AirframeError,
-        match="unknown airframe 'nimbus'; known: c172, easyglider, f450, f550, plane, rover, rover-skid, x500",
+        match="unknown airframe 'nimbus'; known: c172, easyglider, f450, f550, plane, rover, rover-skid, ugv, x500",
     ):
         load_airframe("nimbus")
 
