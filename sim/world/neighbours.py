@@ -181,7 +181,11 @@ def carries(others: Neighbours, tick: int, pos_ned: wp.vec3, top_m: float, reach
         if i != others.i_own and others.rows[i].is_ball == 1:
             off = neighbour_pos(others.rows[i], tick) - pos_ned
             gap_m = -off[2] - top_m
-            if gap_m > 0.0 and gap_m < others.rows[i].half_length and off[0] * off[0] + off[1] * off[1] < reach_m * reach_m:
+            if (
+                gap_m > 0.0
+                and gap_m < others.rows[i].half_length
+                and off[0] * off[0] + off[1] * off[1] < reach_m * reach_m
+            ):
                 is_laden = True
     return is_laden
 

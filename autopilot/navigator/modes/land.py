@@ -19,7 +19,7 @@ _SLOW_BELOW_M = 30.0  # height above home below which ground may be anywhere, fa
 class Landing:
     """The last descent, until the landing detector ends it."""
 
-    __slots__ = ("_blind_since_us", "_context", "_east", "_is_blind", "_moving_us", "_north", "_yaw")
+    __slots__ = ("_blind_since_us", "_context", "_east", "_is_blind", "_moving_us", "_north", "_vel_ned", "_yaw")
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
@@ -27,13 +27,18 @@ class Landing:
         self._is_blind = False
         self._moving_us = 0  # when it last really descended
         self._blind_since_us = 0
+        self._vel_ned: Vector | None = None  # of a place that moves
 
     def start(self, north: float, east: float, yaw: float) -> None:
         """Descends over a position [m] with a heading [rad], NaN: the present one."""
-        self._north, self._east = north, east
+        self._north, self._east, self._vel_ned = north, east, None
         self._yaw = yaw if isfinite(yaw) else self._context.state.yaw_rad
         self._is_blind = False
         self._moving_us = self._context.state.time_us
+
+    def move(self, north: float, east: float, vel_ned: Vector) -> None:
+        """The position has become another [m], and goes on at a velocity [m/s]: renewed each frame."""
+        self._north, self._east, self._vel_ned = north, east, vel_ned
 
     def frame(self) -> None:
         context = self._context
@@ -44,7 +49,11 @@ class Landing:
             if self._is_blind:  # the position is back: land here
                 self._is_blind = False
                 self._north, self._east, _ = context.stop_point()
+                self._vel_ned = None
             speed = self._pushed(self._speed())
+            if self._vel_ned is not None:
+                context.setpoint.track_down((self._north, self._east), self._vel_ned, speed, self._yaw)
+                return
             context.setpoint.descend_at(self._north, self._east, speed, self._yaw, context.cruise_speed)
             return
         if not self._is_blind:

@@ -1,8 +1,8 @@
 """Precision landing: down onto a target that something on board sees (a beacon, a marker).
 
 In: places of the target in ned, as often as it is seen. Out: setpoints: over the target, down with it in the middle,
-and the last bit without looking. While it is not seen the vehicle searches from PLD_SRCH_ALT; what is not found within
-PLD_SRCH_TOUT or PLD_MAX_SRCH searches ends in a normal landing.
+and the last bit without looking, or along with a target that moves. While it is not seen the vehicle searches from
+PLD_SRCH_ALT; what is not found within PLD_SRCH_TOUT or PLD_MAX_SRCH searches ends in a normal landing.
 """
 
 from enum import IntEnum
@@ -20,6 +20,7 @@ FRESH_US = 1_000_000  # older sightings say nothing about now
 _ACCEL_STD_M_S2 = 0.3  # of a platform that stands or moves steadily; guess
 _SIGHT_STD_M = 0.1  # of one sighting; guess
 _LOWEST_M = 1.0  # height above the ground of the approach, at least: nobody flies sideways below that; guess
+_MOVES_M_S = 0.2  # a target that is faster is on something that drives; slower may be noise; guess
 _CENTRED_FRACTION = 3.0  # times PLD_HACC_RAD: further off the descent stops until it is centred again; guess
 
 
@@ -33,7 +34,17 @@ class _Phase(IntEnum):
 class PrecisionLand(FlightMode):
     """Mode Precision land."""
 
-    __slots__ = ("_approach_d", "_context", "_landing", "_phase", "_searches", "_until_us", "_yaw", "target")
+    __slots__ = (
+        "_approach_d",
+        "_context",
+        "_is_moving",
+        "_landing",
+        "_phase",
+        "_searches",
+        "_until_us",
+        "_yaw",
+        "target",
+    )
 
     is_below_floor = True
 
@@ -42,6 +53,7 @@ class PrecisionLand(FlightMode):
         self._landing = Landing(context)
         self.target = TargetFilter(_ACCEL_STD_M_S2)
         self._phase = _Phase.APPROACH
+        self._is_moving = False  # the target, on the last bit
         self._searches = 0
         self._until_us = 0
         self._approach_d = 0.0  # [m]
@@ -68,6 +80,9 @@ class PrecisionLand(FlightMode):
         if context.is_on_ground:
             return
         if self._phase is _Phase.LAND:
+            if self._is_moving:
+                north, east, _ = self.target.at(context.state.time_us)
+                self._landing.move(north, east, self.target.vel_ned)
             self._landing.frame()
             return
         if not context.has_position:
@@ -100,6 +115,7 @@ class PrecisionLand(FlightMode):
         if self._phase is _Phase.DESCEND:
             if height_m < context.craft.standing_height_m + context.number("PLD_FAPPR_ALT"):
                 self._phase = _Phase.LAND
+                self._is_moving = target.speed_xy > _MOVES_M_S
                 self._landing.start(position[0], position[1], self._yaw)
                 self._landing.frame()
                 return
@@ -132,7 +148,7 @@ class PrecisionLand(FlightMode):
 
     def _land(self, reason: str) -> None:
         context = self._context
-        self._phase = _Phase.LAND
+        self._phase, self._is_moving = _Phase.LAND, False
         north, east, _ = context.stop_point()
         self._landing.start(north, east, nan)
         self._landing.frame()

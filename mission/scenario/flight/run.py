@@ -15,7 +15,7 @@ from mission.plan.plan_file import Plan
 from mission.scenario.scenario import Scenario, Vehicle
 from mission.script import Drone
 
-TOUCH_HEIGHT_M = 0.4  # lower than this above the ground, what flies touches the ground
+TOUCH_HEIGHT_M = 0.4  # lower than this above the ground, or with a foot on something, what flies lands
 
 
 class Witness:
@@ -39,7 +39,9 @@ class Witness:
         """Notes the hardest touch of the frame, and forgets it; after each frame."""
         impact = self._impact[0]
         if impact > 0.0:
-            is_ground = not self._flight.drives and float(self._truth_row["height_agl_m"]) < TOUCH_HEIGHT_M
+            truth = self._truth_row
+            stands = bool(truth["is_on_ground"]) or float(truth["height_agl_m"]) < TOUCH_HEIGHT_M
+            is_ground = stands and not self._flight.drives
             self.touches.append((self._now_s(), float(impact), is_ground))
             self._impact[0] = 0.0
             self._body["impact_speed"][0] = 0.0

@@ -70,7 +70,7 @@ def _distances(seen: Seen, frames: Rows, point: Point, *, is_level: bool) -> Row
 
 def near(seen: Seen, check: c.Check, asked: c.Near) -> Judged:
     """How far it is from a point or a vehicle."""
-    frames = seen.frames(check)
+    frames = seen.frames(check, only_armed=check.from_ is None)
     if asked.to_vehicle is None:
         distance = _distances(seen, frames, asked.point or (0.0, 0.0, 0.0), is_level=asked.is_level)
         yield most("distance", distance, seen.time_s[frames], asked.within_m, "m", what="from the point")

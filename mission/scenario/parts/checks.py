@@ -38,7 +38,7 @@ class Corridor(Part):
 
 
 class Near(Part):
-    """It stays near a point, or near another vehicle."""
+    """It stays near a point, or near another vehicle: while armed, or from `from` on whether armed or not."""
 
     point: Point | None = None
     to_vehicle: int | None = Field(default=None, ge=1, le=50)

@@ -8,7 +8,7 @@ from tests.documents import ROOT, blocks
 
 PAGE = ROOT / "docs" / "how-to" / "scenarios.md"
 QUICK = ("gnss-loss", "motor-out-hexa", "precision-landing", "square")
-REPEATED = ("descent-over-a-rover", "gnss-jamming", "forest-crossing")
+REPEATED = ("landing-on-a-rover", "gnss-jamming", "forest-crossing")
 
 
 def scenario(name):
