@@ -27,6 +27,7 @@ from mission.boards.board_session import station_links
 from mission.connections import open_foxglove, open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
+from mission.dataset.recording import record_flight
 from mission.flight import Flight, flight_parameters
 from mission.flight_base import FlightBase
 from mission.flight_config import FlightConfig
@@ -95,6 +96,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
             make_flight=make_flight,
             guard=GuardSettings(is_on=options.has_guard),
         )
+    recording = record_flight(flight, companion, folder, options.policy or name) if options.is_recorded else None
     watch = watch_of(flight, companion, options.seconds)
     session = FlightSession(
         flight,
@@ -115,6 +117,8 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     if peer_run is not None:
         peer_run.start(flight)
     session.fly(lambda _: running.is_done, running, [watch.frame])
+    if recording is not None:
+        recording.close()
     is_stopped = not running.is_done and not flight.end_reason
     running.cancel()
     if trouble := flight.end_reason or running.error:
