@@ -48,7 +48,7 @@ class FollowMeJudge:
     def actions(self, run: DecisionRows) -> Rows:
         """The pilot's, or where a guard or another flew what leads there; clipped to [-1, 1]."""
         n = len(run)
-        flown = _commands(run.flown)
+        flown = command_rows_of(run.flown)
         last = np.empty_like(flown)
         last[1:] = flown[:-1]
         last["vel_ned"][0] = (*run.vel_ned[0, :2], 0.0)
@@ -121,7 +121,8 @@ def _struct(kind: Any) -> Any:
     return kind.numpy_dtype()
 
 
-def _commands(flown: Rows) -> Rows:
+def command_rows_of(flown: Rows) -> Rows:
+    """Velocities and yaw rates as rows of `Command`; no yaw rate is none."""
     rows = np.zeros(len(flown), _struct(Command))
     rows["vel_ned"], rows["yaw_rate"] = flown[:, :3], np.nan_to_num(flown[:, 3])
     return rows

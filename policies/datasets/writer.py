@@ -120,7 +120,7 @@ class DatasetWriter:
                 "rewards_std": float(rewards.std()),
                 "rewards_max": float(rewards.max()),
                 "rewards_min": float(rewards.min()),
-                **{f"context_{name}": value for name, value in episode.context.items()},
+                **{f"context_{name}": value for name, value in sorted(episode.context.items())},
             }
         )
 
