@@ -49,7 +49,7 @@ def build_dataset(options: BuildOptions, console: Console) -> None:
         from mission.dataset.build_hover import hover_episodes
 
         origin = DatasetOrigin(task.layout, settings.model_dump(mode="json"), "flights", rewards_by="estimate")
-        episodes = hover_episodes(logs, task, console)
+        episodes = hover_episodes(logs, task)
     else:
         judge = judge_of(task)
         has_truth = options.has_truth and _all_have_truth(logs, judge)
