@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 
 from mission.console.terminal import print_line
-from mission.dataset.sources import FlightSource, logs_at, read_flight
+from mission.dataset.sources import FlightSource, has_truth, logs_at, read_flight
 from mission.train.task_arguments import task_of
 from policies.datasets.decisions import Judge, episodes_of, runs_of
 from policies.datasets.episodes import DatasetError, DatasetOrigin, EpisodeRows
@@ -43,8 +43,9 @@ def build_dataset(options: BuildOptions, console: Console) -> None:
         DemonstrationFileError: the dataset cannot be written.
     """
     check_is_free(options.out)
+    pairs = task_pairs(options.task, options.env_args)
     logs = [log for source in options.sources for log in logs_at(source)]
-    task, settings = task_of(options.task, task_pairs(options.task, options.env_args), 1)
+    task, settings = task_of(options.task, pairs, 1)
     if options.task == HOVER:
         from mission.dataset.build_hover import hover_episodes
 
@@ -52,21 +53,21 @@ def build_dataset(options: BuildOptions, console: Console) -> None:
         episodes = hover_episodes(logs, task)
     else:
         judge = judge_of(task)
-        has_truth = options.has_truth and _all_have_truth(logs, judge)
+        by_truth = options.has_truth and all(map(has_truth, logs))
         origin = DatasetOrigin(
             task.layout,
             settings.model_dump(mode="json"),
             "flights",
-            rewards_by="truth" if has_truth else "estimate",
+            rewards_by="truth" if by_truth else "estimate",
         )
-        episodes = _episodes(logs, judge, replace(options, has_truth=has_truth), console)
+        episodes = _episodes(logs, judge, replace(options, has_truth=by_truth), console)
     with DatasetWriter(options.out, origin) as writer:
         writer.add_all(episodes)
     words = f"{writer.episodes} episodes, {writer.steps} decisions, rewards by the {origin.rewards_by}"
     print_line(console, f"{options.out}: {words}")
 
 
-def _read(log: Path, judge: Judge, *, has_truth: bool) -> FlightSource:
+def _read(log: Path, judge: Judge, *, by_truth: bool) -> FlightSource:
     """A log of the judge's task.
 
     Raises:
@@ -74,7 +75,7 @@ def _read(log: Path, judge: Judge, *, has_truth: bool) -> FlightSource:
     """
     if log.suffix == ".tlog":
         raise DatasetError(f"{log}: a .tlog holds no topic policy_decision; build from the run's .ulg")
-    source = read_flight(log, has_truth=has_truth)
+    source = read_flight(log, by_truth=by_truth)
     try:
         replace(judge.layout, stack=1).require(source.rows.layout, f"{log}: policy_decision")
     except LayoutError as error:
@@ -82,13 +83,9 @@ def _read(log: Path, judge: Judge, *, has_truth: bool) -> FlightSource:
     return source
 
 
-def _all_have_truth(logs: list[Path], judge: Judge) -> bool:
-    return all(_read(log, judge, has_truth=True).truth is not None for log in logs)
-
-
 def _episodes(logs: list[Path], judge: Judge, options: BuildOptions, console: Console) -> Iterator[EpisodeRows]:
     for log in logs:
-        source = _read(log, judge, has_truth=options.has_truth)
+        source = _read(log, judge, by_truth=options.has_truth)
         for time_s, gap_s in runs_of(source.rows, has_others=options.has_others).gaps:
             print_line(
                 console, f"{log}: policy_decision: nothing for {gap_s:.2f} s at {time_s:.1f} s: an episode is cut there"

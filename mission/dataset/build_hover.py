@@ -22,4 +22,6 @@ def hover_episodes(logs: Sequence[Path], task: Task) -> Iterator[EpisodeRows]:
             count += 1
             yield episode
         if not count:
-            raise DatasetError(f"{path}: {POSITION_SP}: no position was kept for {LEAST * STEP_US * 1e-6:g} s in the air")
+            raise DatasetError(
+                f"{path}: {POSITION_SP}: no position was kept for {LEAST * STEP_US * 1e-6:g} s in the air"
+            )

@@ -58,9 +58,7 @@ def collect_dataset(options: CollectOptions, console: Console) -> None:
         raise DatasetError(f"{task.layout.task}: shows images as it is set, and datasets of episodes hold none")
     settings = getattr(task, "settings", None) or settings_of(options.task, options.env_args)
     pilot = (Path(name).stem if is_named else options.policy) + (f"-noise-{options.noise:g}" if options.noise else "")
-    origin = DatasetOrigin(
-        task.layout, settings.model_dump(mode="json"), pilot, options.seed
-    )
+    origin = DatasetOrigin(task.layout, settings.model_dump(mode="json"), pilot, options.seed)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as bar, DatasetWriter(options.out, origin) as writer:
         line = bar.add_task(options.task, total=options.episodes)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pyulog import ULog
 
-from mission.dataset.recording import COMPANION_LOG, IMAGES_FILE, read_image
+from mission.dataset.companion_log import COMPANION_LOG, IMAGES_FILE, read_image
 from mission.flight_config import FlightConfig
 from mission.log.motion_topics import STEERING_TOPIC
 from mission.log.replay_topic import OWNER, REPLAY_TOPIC
@@ -96,7 +96,18 @@ class FlightSource:
             raise DatasetError(f"{archive}: a picture of {self.path.name} is missing or damaged") from error
 
 
-def read_flight(path: Path, *, has_truth: bool = True) -> FlightSource:
+def has_truth(path: Path) -> bool:
+    """Whether a log holds the truth beside its decisions.
+
+    Raises:
+        DatasetError: it cannot be read.
+    """
+    log = read_log(path, (PLACE, ATTITUDE, REPLAY_TOPIC.name))
+    topics = (PLACE, ATTITUDE, REPLAY_TOPIC.name)
+    return CONFIG_KEY in log.msg_info_multiple_dict and all(columns_of(log, name) is not None for name in topics)
+
+
+def read_flight(path: Path, *, by_truth: bool = True) -> FlightSource:
     """The decisions of a log, and the truth at each, if it is to be used and is there.
 
     Raises:
@@ -123,7 +134,7 @@ def read_flight(path: Path, *, has_truth: bool = True) -> FlightSource:
         **{name: array.astype(np.float32) if array.dtype.kind == "f" else array for name, array in arrays.items()},
         context=_context(config),
     )
-    return FlightSource(path, rows, _truth(log, config, rows.time_us) if has_truth and config is not None else None)
+    return FlightSource(path, rows, _truth(log, config, rows.time_us) if by_truth and config is not None else None)
 
 
 def _context(config: FlightConfig | None) -> dict[str, str | float]:

@@ -1,8 +1,8 @@
 """What a companion notes of each decision, for those who learn from flights: what was shown, chosen, and flown.
 
 Out: a `Decision` to whoever listens, 10 Hz: whoever flies, a policy, a script, or a human or a mission while the
-companion only looks on. It holds what came over MAVLink and nothing of a simulator. The functions below give its form in a
-ULog: the flight's, or one of the companion's own.
+companion only looks on. It holds what came over MAVLink and nothing of a simulator. The functions below give its form
+in a ULog: the flight's, or one of the companion's own.
 """
 
 import json

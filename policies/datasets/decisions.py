@@ -6,6 +6,7 @@ n decisions has n - 1 steps. It ends where the task's own function says so, or i
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -111,7 +112,7 @@ def runs_of(rows: DecisionRows, *, has_others: bool) -> Runs:
     is_gap = (steps > GAP_US) | (steps <= 0)
     is_cut = is_gap | ~is_same | rows.is_first[1:].astype(bool)
     bounds = [0, *(np.flatnonzero(is_cut) + 1).tolist(), len(rows)]
-    found = [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True) if b - a >= _LEAST]
+    found = [slice(a, b) for a, b in pairwise(bounds) if b - a >= _LEAST]
     slices = tuple(each for each in found if has_others or rows.is_flying[each.start])
     within = is_gap & is_same & (has_others | rows.is_flying[1:].astype(bool))
     gaps = tuple((float(rows.time_us[k]) * 1e-6, float(steps[k]) * 1e-6) for k in np.flatnonzero(within))

@@ -4,9 +4,8 @@ In: the estimate, the position that was to be kept, and the rates and thrust tha
 was. Out: episodes about each position that stayed the same, paid by the task's own function on the estimate.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from collections.abc import Mapping
 
 import numpy as np
 import warp as wp

@@ -100,9 +100,7 @@ class DatasetWriter:
         }
         for name, column in columns.items():
             chunk = (min(CHUNK_ROWS, len(column)), *column.shape[1:])
-            group.create_dataset(
-                name, data=column, chunks=chunk, maxshape=(None, *column.shape[1:]), track_times=False
-            )
+            group.create_dataset(name, data=column, chunks=chunk, maxshape=(None, *column.shape[1:]), track_times=False)
         if episode.images is not None:
             infos = group.create_group("infos")
             chunk = (1, *episode.images.shape[1:])

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from common.attitude import Vector
 from common.image_stream import ImageFrame
+from policies.companion.decision_log import NO_GOAL
 from policies.companion.guard.guard import Guard, Stance
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
-from policies.companion.decision_log import NO_GOAL
 from policies.companion.observation import Observer
 from policies.companion.owner_watch import OwnerWatch
 from policies.companion.senses.senses import Senses
