@@ -32,6 +32,7 @@ class BuildOptions:
     has_truth: bool = True
     has_others: bool = False
     has_images: bool = False
+    numbers: tuple[str, ...] = ()
 
 
 def build_dataset(options: BuildOptions, console: Console) -> None:
@@ -40,16 +41,22 @@ def build_dataset(options: BuildOptions, console: Console) -> None:
     Raises:
         DatasetError: a log cannot be used.
         UnknownTask: no such setting.
+        NumberError: no such number of the task, or a value that it cannot have.
         DemonstrationFileError: the dataset cannot be written.
     """
     check_is_free(options.out)
     pairs = task_pairs(options.task, options.env_args)
     logs = [log for source in options.sources for log in logs_at(source)]
     task, settings = task_of(options.task, pairs, 1)
+    numbers = _numbers(options.numbers)
+    task.set_params(numbers)
+    notes = {f"number {name}": f"{value:g}" for name, value in numbers.items()}
     if options.task == HOVER:
         from mission.dataset.build_hover import hover_episodes
 
-        origin = DatasetOrigin(task.layout, settings.model_dump(mode="json"), "flights", rewards_by="estimate")
+        origin = DatasetOrigin(
+            task.layout, settings.model_dump(mode="json"), "flights", rewards_by="estimate", notes=notes
+        )
         episodes = hover_episodes(logs, task)
     else:
         judge = judge_of(task)
@@ -59,12 +66,29 @@ def build_dataset(options: BuildOptions, console: Console) -> None:
             settings.model_dump(mode="json"),
             "flights",
             rewards_by="truth" if by_truth else "estimate",
+            notes=notes,
         )
         episodes = _episodes(logs, judge, replace(options, has_truth=by_truth), console)
     with DatasetWriter(options.out, origin) as writer:
         writer.add_all(episodes)
     words = f"{writer.episodes} episodes, {writer.steps} decisions, rewards by the {origin.rewards_by}"
     print_line(console, f"{options.out}: {words}")
+
+
+def _numbers(pairs: tuple[str, ...]) -> dict[str, float]:
+    """Numbers of the task, as given.
+
+    Raises:
+        DatasetError: one is not NAME=VALUE.
+    """
+    numbers = {}
+    for pair in pairs:
+        name, _, value = pair.partition("=")
+        try:
+            numbers[name] = float(value)
+        except ValueError as error:
+            raise DatasetError(f"--number {pair}: give NAME=VALUE, as kept_m=3") from error
+    return numbers
 
 
 def _read(log: Path, judge: Judge, *, by_truth: bool) -> FlightSource:

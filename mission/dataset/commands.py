@@ -33,12 +33,13 @@ def _refusing() -> Iterator[None]:
         from policies.experts.demonstration_file import DemonstrationFileError
         from policies.tasks.catalogue import UnknownTask
         from policies.tasks.layout import LayoutError
+        from policies.tasks.task_params import NumberError
 
         try:
             yield
-        except (
-            DatasetError, DemonstrationFileError, LayoutError, NoExpert, PlayError, UnknownTask, VideoError,
-        ) as error:  # fmt: skip
+        except (DatasetError, DemonstrationFileError, LayoutError, NoExpert, NumberError, PlayError) as error:
+            refuse(str(error))
+        except (UnknownTask, VideoError) as error:
             refuse(str(error))
 
 
@@ -54,6 +55,9 @@ def build(
     others: Annotated[
         bool, typer.Option("--others", help="Count what another flew while the companion looked on, too.")
     ] = False,
+    number: Annotated[
+        list[str] | None, typer.Option(help="A number of the task, as its reward weighs: NAME=VALUE. Repeatable.")
+    ] = None,
     images: Annotated[bool, typer.Option("--images", help="Keep the pictures beside the observations.")] = False,
 ) -> None:
     """Build a dataset from logged flights."""
@@ -61,7 +65,8 @@ def build(
         with loading(Console()):
             from mission.dataset.build import BuildOptions, build_dataset
 
-        options = BuildOptions(tuple(sources), task, output, tuple(env_args or ()), truth, others, images)
+        chosen = (truth, others, images, tuple(number or ()))
+        options = BuildOptions(tuple(sources), task, output, tuple(env_args or ()), *chosen)
         build_dataset(options, Console())
 
 

@@ -150,8 +150,14 @@ def episodes_of(
         who = "" if has_others else " that the companion flew"
         raise DatasetError(f"{rows.source}: policy_decision holds no two decisions in a row{who}")
     for chosen in runs:
-        run = rows.part(chosen)
-        yield _episode(run, judge, None if truth is None else truth.part(chosen), images)
+        at = chosen.start
+        while chosen.stop - at >= _LEAST:
+            rest = slice(at, chosen.stop)
+            episode = _episode(rows.part(rest), judge, None if truth is None else truth.part(rest), images)
+            yield episode
+            at += len(episode)
+            if episode.is_terminated and not episode.is_success:
+                break  # whatever it does after it struck something
 
 
 def _episode(

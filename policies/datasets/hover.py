@@ -6,6 +6,7 @@ was. Out: episodes about each position that stayed the same, paid by the task's 
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -116,9 +117,8 @@ class HoverBuilder:
         )
 
 
-def _struct(kind: type) -> np.dtype:  # type: ignore[type-arg]
-    found: np.dtype = kind.numpy_dtype()  # type: ignore[attr-defined,type-arg]
-    return found
+def _struct(kind: Any) -> Any:
+    return kind.numpy_dtype()
 
 
 def _actions(omega_frd_sp: Rows, thrust: Rows) -> NDArray[np.float32]:

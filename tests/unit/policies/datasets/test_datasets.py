@@ -85,8 +85,9 @@ def test_what_is_left_by_an_error_leaves_nothing(tmp_path):
 
 
 def test_a_dataset_without_an_episode_is_none(tmp_path):
-    with pytest.raises(DatasetError, match="no episode"), DatasetWriter(
-        tmp_path / "set", DatasetOrigin(LAYOUT, {}, "test")
+    with (
+        pytest.raises(DatasetError, match="no episode"),
+        DatasetWriter(tmp_path / "set", DatasetOrigin(LAYOUT, {}, "test")),
     ):
         pass
     assert list(tmp_path.iterdir()) == []
