@@ -96,7 +96,8 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
             make_flight=make_flight,
             guard=GuardSettings(is_on=options.has_guard),
         )
-    recording = record_flight(flight, companion, folder, options.policy or name) if options.is_recorded else None
+    if options.is_recorded:
+        held.callback(record_flight(flight, companion, folder, options.policy or name).close)
     watch = watch_of(flight, companion, options.seconds)
     session = FlightSession(
         flight,
@@ -110,15 +111,12 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     )
     running = flight.drone.start(follow(flight.drone, companion, options.seconds))
     where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.gcs_port}"
-    print_line(console, f"{name} follows an owner who {options.owner}s; {where}")
-    print_line(console, f"logs: {folder}")
+    print_line(console, f"{name} follows an owner who {options.owner}s; {where}\nlogs: {folder}")
     if page is not None:
         print_line(console, f"live page: {page.url}")
     if peer_run is not None:
         peer_run.start(flight)
     session.fly(lambda _: running.is_done, running, [watch.frame])
-    if recording is not None:
-        recording.close()
     is_stopped = not running.is_done and not flight.end_reason
     running.cancel()
     if trouble := flight.end_reason or running.error:
@@ -127,8 +125,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     exit_code = finish(watch, session.files, console, is_down=is_down, is_stopped=is_stopped)
     if flight.is_crashed:
         print_line(console, "the vehicle crashed" + (f" ({', '.join(watch.takeovers)})" if watch.takeovers else ""))
-    print_line(console, guard_text(companion))
-    print_line(console, latency_text(companion))
+    print_line(console, f"{guard_text(companion)}\n{latency_text(companion)}")
     has_film = options.has_film and filmed(flight, folder, console)
     print_line(console, f"{'logs, scorecard and film' if has_film else 'logs and scorecard'}: {folder}")
     session.close()

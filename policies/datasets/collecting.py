@@ -5,8 +5,10 @@ policies of a run, merged.
 """
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from policies.datasets.episodes import EpisodeRows
 from policies.experts.episode_recording import Episode, Recorder
@@ -76,7 +78,7 @@ def collected(
 
 def rows_of(episode: Episode, layout: Layout) -> EpisodeRows:
     """A recorded episode as a dataset holds it."""
-    actions = episode.continuous
+    actions: NDArray[Any] = episode.continuous
     if layout.branches:
         actions = episode.branches[:, 0] if len(layout.branches) == 1 else episode.branches
     return EpisodeRows(

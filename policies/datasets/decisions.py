@@ -74,8 +74,9 @@ class TruthRows:
     def part(self, chosen: slice) -> "TruthRows":
         """Some of the rows."""
         owner = None if self.owner is None else self.owner[chosen]
-        arrays = (self.pos_ned, self.vel_ned, self.q_ned_from_frd, self.height_m, self.is_on_ground)
-        return TruthRows(*(array[chosen] for array in arrays), owner, self.world)
+        names = ("pos_ned", "vel_ned", "q_ned_from_frd", "height_m", "is_on_ground")
+        arrays = {name: getattr(self, name)[chosen] for name in names}
+        return TruthRows(**arrays, owner=owner, world=self.world)
 
 
 class Judge(Protocol):
