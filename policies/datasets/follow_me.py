@@ -122,9 +122,9 @@ def _struct(kind: Any) -> Any:
 
 
 def command_rows_of(flown: Rows) -> Rows:
-    """Velocities and yaw rates as rows of `Command`; no yaw rate is none."""
+    """Velocities and yaw rates as rows of `Command`."""
     rows = np.zeros(len(flown), _struct(Command))
-    rows["vel_ned"], rows["yaw_rate"] = flown[:, :3], np.nan_to_num(flown[:, 3])
+    rows["vel_ned"], rows["yaw_rate"] = flown[:, :3], flown[:, 3]
     return rows
 
 

@@ -94,13 +94,23 @@ def navigate_action_rows(
     flown: wp.array(dtype=Command),
     out: wp.array(dtype=wp.vec4),
 ) -> None:
-    """The action of every row: what was asked for if that was flown, else what asks for what was flown."""
+    """The action of every row: what was asked for if that was flown, else what asks for that.
+
+    Where no yaw rate was flown, NaN, a rover was: it is asked for no climb and no turn, whatever an action says of them.
+    """
     i = wp.tid()
     led_to = action_command(asked[i], q_ned_from_frd[i])
-    off = wp.length(led_to.vel_ned - flown[i].vel_ned) + wp.abs(led_to.yaw_rate - flown[i].yaw_rate)
+    is_level = wp.isnan(flown[i].yaw_rate)
+    difference = led_to.vel_ned - flown[i].vel_ned
+    off = wp.sqrt(difference[0] * difference[0] + difference[1] * difference[1])
+    if not is_level:
+        off += wp.abs(difference[2]) + wp.abs(led_to.yaw_rate - flown[i].yaw_rate)
     fractions = asked[i]
     if not off < _SAME:  # NaN is not
         fractions = command_fractions(flown[i], q_ned_from_frd[i])
+        if is_level:
+            for k in range(2, 4):
+                fractions[k] = wp.where(wp.isnan(asked[i][k]), 0.0, asked[i][k])
     for k in range(4):
         fractions[k] = wp.clamp(fractions[k], -1.0, 1.0)
     out[i] = fractions

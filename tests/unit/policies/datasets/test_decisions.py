@@ -104,6 +104,15 @@ def test_navigate_pays_the_way_and_ends_at_the_goal(navigate):
     assert np.allclose(episode.actions[:, 0], 4.0 / 7.0)
 
 
+def test_what_a_rover_ignores_of_an_action_stays_as_it_was_asked():
+    judge = NavigateJudge(task_of("NavigateRover"))
+    asked = np.tile(np.array([2.0 / 7.0, 0.0, 0.3, -0.4], np.float32), (12, 1))
+    level = np.tile(np.array([2.0, 0.0, 0.0, np.nan], np.float32), (12, 1))
+    assert np.array_equal(judge.actions(decisions(judge.layout, action=asked, flown=level)), asked)
+    slower = judge.actions(decisions(judge.layout, action=asked, flown=0.5 * level))
+    assert np.allclose(slower, asked * (0.5, 1.0, 1.0, 1.0))
+
+
 def test_navigate_without_a_goal_is_refused(navigate):
     rows = decisions(navigate.layout, goal=(np.nan, 0.0, 0.0))
     with pytest.raises(DatasetError, match="decisions without a goal"):
