@@ -110,10 +110,11 @@ def _read(log: Path, judge: Judge, *, by_truth: bool) -> FlightSource:
 def _episodes(logs: list[Path], judge: Judge, options: BuildOptions, console: Console) -> Iterator[EpisodeRows]:
     for log in logs:
         source = _read(log, judge, by_truth=options.has_truth)
-        for time_s, gap_s in runs_of(source.rows, has_others=options.has_others).gaps:
-            print_line(
-                console, f"{log}: policy_decision: nothing for {gap_s:.2f} s at {time_s:.1f} s: an episode is cut there"
-            )
+        gaps = runs_of(source.rows, has_others=options.has_others).gaps
+        if gaps:
+            (time_s, gap_s), more = gaps[0], f", and {len(gaps) - 1} more gaps" if len(gaps) > 1 else ""
+            text = f"{log}: policy_decision: nothing for {gap_s:.2f} s at {time_s:.1f} s{more}: episodes are cut there"
+            print_line(console, text)
         yield from episodes_of(
             source.rows,
             judge,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pyulog import ULog
 
-from mission.dataset.companion_log import COMPANION_LOG, IMAGES_FILE, read_image
+from mission.dataset.companion_log import IMAGES_FILE, read_image
 from mission.flight_config import FlightConfig
 from mission.log.motion_topics import STEERING_TOPIC
 from mission.log.replay_topic import OWNER, REPLAY_TOPIC
@@ -127,7 +127,7 @@ def read_flight(path: Path, *, by_truth: bool = True) -> FlightSource:
     except (KeyError, ValueError, TypeError) as error:
         raise DatasetError(f"{path}: {TOPIC}: damaged, or of another version") from error
     rows = DecisionRows(
-        source=path.name if path.name == COMPANION_LOG else f"{path.absolute().parent.name}/{path.name}",
+        source=f"{path.absolute().parent.name}/{path.name}",
         layout=layout,
         pilot=info_text(log, PILOT_KEY),
         time_us=columns["timestamp"],

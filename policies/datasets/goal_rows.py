@@ -96,7 +96,7 @@ def navigate_action_rows(
 ) -> None:
     """The action of every row: what was asked for if that was flown, else what asks for that.
 
-    Where no yaw rate was flown, NaN, a rover was: it is asked for no climb and no turn, whatever an action says of them.
+    Where no yaw rate was flown, NaN, a rover was: what an action says of climb and turn is not looked at.
     """
     i = wp.tid()
     led_to = action_command(asked[i], q_ned_from_frd[i])
