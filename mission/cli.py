@@ -16,6 +16,7 @@ from mission.console.command_refusal import refuse
 from mission.console.late_command import LateCommand
 from mission.console.name_checks import check_file
 from mission.console.terminal import loading
+from mission.dataset import commands as dataset_commands
 from mission.follow import follow_commands
 from mission.foxglove import mcap_command
 from mission.park import park_command
@@ -158,4 +159,5 @@ app.command(name="campaign")(campaign_command.fly_campaign_file)
 app.command()(mcap_command.mcap)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)
 app.command(name="eval")(training_commands.evaluate)
+app.add_typer(dataset_commands.app, name="dataset")
 app.command()(training_commands.export)

@@ -14,7 +14,7 @@ from common.files import write_whole
 from mission.console.option_checks import UserError
 from mission.console.terminal import print_line
 
-_OF_A_FLIGHT = ("flight*.ulg", "flight*.tlog", "flight.mcap", "summary.json", "vehicle-*")
+_OF_A_FLIGHT = ("flight*.ulg", "flight*.tlog", "flight.mcap", "summary.json", "images.zip", "vehicle-*")
 
 
 @contextmanager

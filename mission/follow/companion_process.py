@@ -7,6 +7,7 @@ clock comes with its telemetry.
 import gc
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from rich.console import Console
@@ -16,6 +17,7 @@ from autopilot.mavlink.transport.client_links import open_client_link
 from autopilot.mavlink.transport.links import LinkError
 from common.clock import Pacer, wall_time_s
 from mission.console.terminal import print_line
+from mission.dataset.companion_log import COMPANION_LOG, CompanionLog
 from policies.companion.companion import MISFIT, Companion
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import CameraUrlError
@@ -42,6 +44,7 @@ class CompanionOptions:
     is_by_sticks: bool = False
     follows: bool = False
     has_guard: bool = True
+    record: Path | None = None
 
 
 def run_companion(options: CompanionOptions, console: Console) -> str:
@@ -68,6 +71,7 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
         raise CompanionError(str(error)) from error
     by_sticks = options.is_by_sticks
     companion = Companion(link, skill, is_reported=options.is_reported, is_by_sticks=by_sticks, wall_s=wall_time_s)
+    recording = _recording(companion, options, console)
     does = "drives" if skill.drives else "flies"
     images = f", pictures: {options.camera}" if skill.camera is not None else ""
     _shower(console)(f"{options.policy} {does}; vehicle: {options.link}{images}; Ctrl-C ends it")
@@ -77,7 +81,29 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
         pass
     finally:
         companion.close()
+        if recording is not None:
+            recording.close()
     return f"{companion.decision_count} decisions; {latency_text(companion)}"
+
+
+def _recording(companion: Companion, options: CompanionOptions, console: Console) -> CompanionLog | None:
+    """The log of its decisions, if one is wanted.
+
+    Raises:
+        CompanionError: it cannot be written, or there is one already; nothing has been sent.
+    """
+    folder = options.record
+    if folder is None:
+        return None
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if (folder / COMPANION_LOG).exists():
+            companion.close()
+            raise CompanionError(f"--record {folder}: holds {COMPANION_LOG} already")
+        return CompanionLog(companion, folder, options.policy, _shower(console))
+    except OSError as error:
+        companion.close()
+        raise CompanionError(f"--record {folder}: cannot write there: {error.strerror or error}") from error
 
 
 def _loop(companion: Companion, options: CompanionOptions, console: Console) -> None:

@@ -1,6 +1,7 @@
 """The commands that follow somebody: `honeyguide follow`, and the companion computer alone, `companion`."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -48,6 +49,9 @@ def companion(
     guard: Annotated[
         bool, typer.Option("--guard/--no-guard", help="A guard that does not believe the policy bounds it.")
     ] = True,
+    record: Annotated[
+        Path | None, typer.Option(help="Keep each decision in this folder, for honeyguide dataset build.")
+    ] = None,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End after this much wall clock time.")] = None,
 ) -> None:
     """Fly a policy as a companion computer does: over MAVLink and the camera's stream, in its own process."""
@@ -58,7 +62,7 @@ def companion(
             from mission.follow.companion_process import CompanionError, CompanionOptions, run_companion
 
         try:
-            options = CompanionOptions(policy, link, camera, engage, seconds, by_sticks, follow, guard)
+            options = CompanionOptions(policy, link, camera, engage, seconds, by_sticks, follow, guard, record)
             typer.echo(run_companion(options, Console()))
         except CompanionError as error:
             refuse(str(error))

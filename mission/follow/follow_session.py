@@ -27,6 +27,7 @@ from mission.boards.board_session import station_links
 from mission.connections import open_foxglove, open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
+from mission.dataset.recording import record_flight
 from mission.flight import Flight, flight_parameters
 from mission.flight_base import FlightBase
 from mission.flight_config import FlightConfig
@@ -95,6 +96,8 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
             make_flight=make_flight,
             guard=GuardSettings(is_on=options.has_guard),
         )
+    if options.is_recorded:
+        held.callback(record_flight(flight, companion, folder, options.policy or name).close)
     watch = watch_of(flight, companion, options.seconds)
     session = FlightSession(
         flight,
@@ -108,8 +111,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     )
     running = flight.drone.start(follow(flight.drone, companion, options.seconds))
     where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.gcs_port}"
-    print_line(console, f"{name} follows an owner who {options.owner}s; {where}")
-    print_line(console, f"logs: {folder}")
+    print_line(console, f"{name} follows an owner who {options.owner}s; {where}\nlogs: {folder}")
     if page is not None:
         print_line(console, f"live page: {page.url}")
     if peer_run is not None:
@@ -123,8 +125,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     exit_code = finish(watch, session.files, console, is_down=is_down, is_stopped=is_stopped)
     if flight.is_crashed:
         print_line(console, "the vehicle crashed" + (f" ({', '.join(watch.takeovers)})" if watch.takeovers else ""))
-    print_line(console, guard_text(companion))
-    print_line(console, latency_text(companion))
+    print_line(console, f"{guard_text(companion)}\n{latency_text(companion)}")
     has_film = options.has_film and filmed(flight, folder, console)
     print_line(console, f"{'logs, scorecard and film' if has_film else 'logs and scorecard'}: {folder}")
     session.close()

@@ -112,6 +112,13 @@ class FlightLog:
         for key, texts in info.items():
             self._log.inform(key, texts)
 
+    def add_rows(self, name: str, fields: Mapping[str, str], info: Mapping[str, Sequence[str]]) -> UlogTopic:
+        """One more topic whose rows come one by one, not with the frames; before the first row."""
+        self._by_name[name] = self._log.add_topic(name, fields)
+        for key, texts in info.items():
+            self._log.inform(key, texts)
+        return self._by_name[name]
+
     def text(self, time_us: int, severity: Severity, text: str) -> None:
         """Logs a text of the vehicle."""
         self._log.message(time_us, int(severity), text)

@@ -157,6 +157,23 @@ class Recorder:
             self._take_shown = take
             self._log.add(REPLAY_TOPIC, info)
 
+    def keep_topic(
+        self, name: str, fields: Mapping[str, str], info: Mapping[str, Sequence[str]]
+    ) -> Callable[..., None]:
+        """The log, if there is one, shall also hold a topic of somebody else's; before the first frame.
+
+        Args:
+            name: of the topic.
+            fields: ULog type by field name.
+            info: what it is read with; texts by key.
+
+        Returns:
+            What writes a row: its time [us], its values.
+        """
+        if self._log is None:
+            return lambda *_: None
+        return self._log.add_rows(name, fields, info).write_row
+
     def frame(self, time_us: int) -> None:
         """Notes the frame that is ending."""
         state = self._controller.state

@@ -20,6 +20,7 @@ from mission.client import Running
 from mission.connections import open_foxglove, open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
+from mission.dataset.recording import record_flight
 from mission.flight import Flight
 from mission.flight_base import FlightBase
 from mission.flight_config import FlightConfig
@@ -88,6 +89,8 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
     folder = held.enter_context(run_folder(options.run_folder))
     guard = GuardSettings(is_on=options.has_guard)
     flight, companion = flight_with_driver(config, pilot, links=links, folder=folder, guard=guard)
+    if options.is_recorded:
+        record_flight(flight, companion, folder, options.policy)
     arrivals: list[Arrival] = []
 
     async def script(drone: Drone) -> None:

@@ -59,7 +59,7 @@ def play_task(options: PlayOptions, console: Console) -> str:
         WindowError: no display.
         VideoError: the film cannot be written.
     """
-    task, driver, who = _cast(options)
+    task, driver, who = cast(options)
     _check_view(task)
     with ExitStack() as stack:
         if options.mp4 is not None:
@@ -83,7 +83,7 @@ def _check_view(task: Task) -> None:
         raise PlayError(str(error)) from None
 
 
-def _cast(options: PlayOptions) -> tuple[Task, Expert, str]:
+def cast(options: PlayOptions) -> tuple[Task, Expert, str]:
     """The task, whoever drives it, and what they are called."""
     is_task = is_task_name(options.what)
     if is_task and options.is_random:

@@ -14,6 +14,7 @@ import numpy as np
 
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.client_end import ByteLink
+from policies.companion.decision_log import Decision, OnDecision, motion_along_nose, motion_of
 from policies.companion.engagement import Engagement, Phase, Sending, Situation, Wish
 from policies.companion.skills.skill import Floats, Skill, Velocity
 from policies.companion.stick_control import StickControl
@@ -58,6 +59,9 @@ class Companion:
         self.latencies_s: deque[float] = deque(maxlen=LATENCIES_KEPT)  # image or scan in to setpoint out
         self.decision_count = 0
         self.trouble = ""  # why it does not fly
+        self.on_decision: OnDecision | None = None
+        """Is told of each decision."""
+        self._was_flying: bool | None = None  # at the decision before
         self._wall_s = wall_s
         self._action: Floats = np.zeros(skill.action_size, dtype=np.float32)
         self._setpoint = STILL
@@ -142,7 +146,29 @@ class Companion:
             self._action = action
             self._setpoint = self.skill.setpoint(action, own)
             self.decision_count += 1
+        if self.on_decision is not None:
+            self.on_decision(self._noted(time_us, is_flying=is_flying))
         return True
+
+    def _noted(self, time_us: int, *, is_flying: bool) -> Decision:
+        """What has just been decided."""
+        own, skill = self.vehicle.own, self.skill
+        moves = motion_along_nose(own) if skill.is_along_nose else motion_of(own)
+        flown = self._setpoint if is_flying else moves
+        is_first, self._was_flying = is_flying is not self._was_flying, is_flying
+        return Decision(
+            time_us=time_us,
+            boot_us=own.boot_us,
+            is_flying=is_flying,
+            is_first=is_first,
+            frame=skill.recorded_frame(own, flown, time_us, is_flying=is_flying),
+            action=self.action if is_flying else np.full(skill.action_size, np.nan, np.float32),
+            wanted=skill.wanted if is_flying else flown,
+            flown=flown,
+            own=own,
+            goal=skill.recorded_goal(own),
+            image=skill.recorded_image(),
+        )
 
     def _situation(self, time_us: int) -> Situation:
         own = self.vehicle.own

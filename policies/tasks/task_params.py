@@ -74,6 +74,10 @@ class TaskParamTable:
         """The samplers on the device."""
         return self._device
 
+    def typical(self) -> np.ndarray[Any, Any]:
+        """Of each number the constant it is, the least it is drawn from or its mean, shape (1, numbers)."""
+        return self.rows[:, _FIRST][None].copy()
+
     def update(self, values: Mapping[str, float | Sampler]) -> None:
         """Sets numbers, or what they are drawn from; it takes effect at the start of the next episodes.
 

@@ -28,10 +28,11 @@ PLACES = {
     "engines": ("sim/engines/quiet_bullet.py", "sim/engines/quiet_jsbsim.py"),
     "gym": ("policies/__init__.py", "policies/tasks"),
     "learn": (
-        *("policies/companion", "policies/experts", "policies/learn", "policies/tracker.py"),
+        *("policies/companion", "policies/datasets", "policies/experts", "policies/learn", "policies/tracker.py"),
         *("policies/person_detector", "mission/benchmark/any_pilot.py"),
         *("mission/train", "mission/video/rtp_video.py", "mission/video/video_file.py"),
     ),
+    "lerobot": ("policies/datasets/exporting.py",),
     "test": ("mission/pytest_plugin",),
     "ray": ("mission/campaign/workers/ray_cluster.py",),
     "dev": ("tests",),

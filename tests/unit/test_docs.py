@@ -51,6 +51,7 @@ RUN_BY_OTHERS = (
     f"{HONEYGUIDE} benchmark ",  # tests/unit/mission/follow/test_benchmark.py
     f"{HONEYGUIDE} test ",  # tests/unit/mission/scenario/test_command.py, tests/system/scenarios
     f"{HONEYGUIDE} campaign ",  # tests/system/campaigns
+    f"{HONEYGUIDE} dataset ",  # tests/system/companion/test_recorded_flight.py, tests/unit/mission/dataset
     f"{HONEYGUIDE} companion ",  # tests/system/companion/test_companion.py
     *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export")),  # tests/unit/mission/train
 )

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT
 from autopilot.ports import Estimate
-from common.attitude import yaw_of
+from common.attitude import Vector, yaw_of
 from common.range_sectors import GROUND_RING
 from common.warp_start import start_warp
+from policies.companion.decision_log import NO_GOAL
 from policies.companion.goals import Goal, Goals
 from policies.companion.guard.goal_guard import NoseGuard
 from policies.companion.guard.settings import GuardSettings
@@ -117,6 +118,9 @@ class Driving(GoalSkill):
         """What an action asks for, along the nose, as the guard lets it."""
         speed, yaw_rate = self._observer.command(action)
         return self._guarded(((speed, 0.0, 0.0), yaw_rate), own)
+
+    def recorded_goal(self, own: Own) -> Vector:
+        return self.goal_pose(own) or NO_GOAL
 
     def goal_pose(self, own: Own) -> Pose | None:
         """Where it drives; None: nowhere."""

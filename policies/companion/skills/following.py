@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from common.attitude import Vector
 from common.image_stream import ImageFrame
+from policies.companion.decision_log import NO_GOAL
 from policies.companion.guard.guard import Guard, Stance
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
@@ -21,6 +22,7 @@ from policies.companion.owner_watch import OwnerWatch
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.tracked_observer import TrackedObserver
+from policies.companion.tracked_recorder import RECORD_LAYOUT, TrackedRecorder
 from policies.companion.vehicle_link import Own, Owner, VehicleLink
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, TILT_DEG, TRACKED
 
@@ -70,6 +72,8 @@ class Following:
         self, camera: ImageSource, pilot: Pilot, guard: GuardSettings | None = None, *, hears: bool | None = None
     ) -> None:
         self.seen: Floats = np.zeros(0, dtype=np.float32)
+        self.wanted: Velocity = ((0.0, 0.0, 0.0), 0.0)
+        self._recorder: TrackedRecorder | None = None  # of a pilot that is told otherwise; made when it is needed
         self.camera = camera
         self._pilot = pilot
         is_tracked, is_guarded = pilot.kind == TRACKED, guard is not None and guard.is_on
@@ -109,6 +113,8 @@ class Following:
             vehicle.clock.pictured(image.time_us)
         if self._senses is not None:
             self._senses.sense(vehicle.own, self._owner, image if self._is_fit(image) else None)
+        if self._recorder is not None:
+            self._recorder.sense(vehicle.own, self._owner, image if self._is_fit(image) else None)
         since_us = time_us - self._decided_us
         wait_us = DECISION_US + (-DECISION_EARLY_US if self._is_new else DECISION_LATE_US)
         return self._image is not None and since_us >= wait_us
@@ -167,13 +173,14 @@ class Following:
 
     def setpoint(self, action: Floats, own: Own) -> Velocity:
         if self._tracked is not None:
-            wanted = self._tracked.setpoint(action, own)
+            wanted = self.wanted = self._tracked.setpoint(action, own)
             allowed = self._guarded(wanted, own)
             self._tracked.flown(*allowed)
             return allowed
         if self._observer is None:
             raise RuntimeError("somebody has to make a setpoint of an action")
-        return self._guarded(self._observer.setpoint(action, own), own)
+        self.wanted = self._observer.setpoint(action, own)
+        return self._guarded(self.wanted, own)
 
     def _guarded(self, wanted: Velocity, own: Own) -> Velocity:
         """What the guard lets be flown."""
@@ -187,6 +194,27 @@ class Following:
                 self._pilot.reset()  # what it remembers is from before
             self._stance = self.guard.stance
         return allowed
+
+    record_layout = RECORD_LAYOUT
+
+    def keep_records(self) -> None:
+        """Its decisions will be noted; before anything is received."""
+        if self._recorder is None:
+            self._recorder = TrackedRecorder(self._senses)
+
+    def recorded_frame(self, own: Own, flown: Velocity, time_us: int, *, is_flying: bool) -> Floats:
+        """What the senses tell, whoever decides by what."""
+        if self._recorder is None:
+            raise RuntimeError("keep_records comes first")
+        age_s = max(own.boot_us - self._image.time_us, time_us - self._image_us, 0) * 1e-6 if self._image else 0.0
+        seen = self.seen if self._tracked is not None and is_flying else None
+        return self._recorder.frame(own, flown, time_us, age_s, seen)
+
+    def recorded_goal(self, own: Own) -> Vector:  # noqa: ARG002
+        return NO_GOAL
+
+    def recorded_image(self) -> NDArray[np.uint8] | None:
+        return None if self._image is None else self._image.pixels
 
     def conclude(self, own: Own) -> None:
         """Tracks the owner: by the newest image, and by the phone; with senses that has been done."""

@@ -6,9 +6,11 @@ which is older then.
 """
 
 from collections import Counter
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from policies.companion.goals import Goals
 from policies.companion.guard.goal_guard import STANDING, GoalGuard, GoalStance
@@ -17,6 +19,7 @@ from policies.companion.ranges import OLD_US, Ranges
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.vector_pilot import VectorPilot
 from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
+from policies.tasks.layout import Layout
 
 DECISION_US, DECISION_EARLY_US = 100_000, 10_000
 DECISION_LATE_US = 50_000  # a scan is waited for so much longer
@@ -51,6 +54,7 @@ class GoalSkill:
         self, pilot: VectorPilot, frames: FrameStack, *, is_ordered_by_goto: bool, guard: GoalGuard | None
     ) -> None:
         self.seen: Floats = np.zeros(0, dtype=np.float32)
+        self.wanted: Velocity = ((0.0, 0.0, 0.0), 0.0)
         self._is_ordered_by_goto = is_ordered_by_goto
         self._pilot = pilot
         self._stack = frames
@@ -89,6 +93,19 @@ class GoalSkill:
             self.guard.begin(own)
         self._decided_us = -DECISION_US
 
+    @property
+    def record_layout(self) -> Layout:
+        return replace(type(self._pilot).task, stack=1)
+
+    def keep_records(self) -> None:
+        """Has nothing to make ready."""
+
+    def recorded_frame(self, own: Own, flown: Velocity, time_us: int, *, is_flying: bool) -> Floats:  # noqa: ARG002
+        return self.seen[-type(self._pilot).task.frame_size :]
+
+    def recorded_image(self) -> NDArray[np.uint8] | None:
+        return None
+
     def conclude(self, own: Own) -> None:
         """Has nothing left to do."""
 
@@ -116,6 +133,7 @@ class GoalSkill:
 
     def _guarded(self, wanted: Velocity, own: Own) -> Velocity:
         """What the guard lets be flown; its stance is told as it changes."""
+        self.wanted = wanted
         if self.guard is None:
             return wanted
         allowed = self.guard.filtered(wanted, own)

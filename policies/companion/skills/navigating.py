@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from common.attitude import Vector
 from common.range_sectors import RANGES
 from common.warp_start import start_warp
+from policies.companion.decision_log import NO_GOAL
 from policies.companion.goals import Goals
 from policies.companion.guard.goal_guard import GoalGuard
 from policies.companion.guard.settings import GuardSettings
@@ -96,6 +97,9 @@ class Navigating(GoalSkill):
         if self.drives:
             return self._guarded(((slower * north, slower * east, 0.0), nan), own)
         return self._guarded(((slower * north, slower * east, down), yaw_rate), own)
+
+    def recorded_goal(self, own: Own) -> Vector:
+        return self.goal_ned(own) or NO_GOAL
 
     def goal_ned(self, own: Own) -> Vector | None:
         """[m] Where it goes; None: nowhere."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from common.attitude import Vector
 from policies.companion.image_client import ImageSource
 from policies.companion.vehicle_link import Own, VehicleLink
+from policies.tasks.layout import Layout
 
 Floats = NDArray[np.float32]
 Velocity = tuple[Vector, float]
@@ -28,6 +29,7 @@ class Skill(Protocol):
     is_along_nose: bool  # its velocities are ahead, right and down
     action_size: int
     seen: Floats  # the vector that was decided on last
+    wanted: Velocity  # what the last action asked for, before a guard
 
     @property
     def camera(self) -> ImageSource | None:
@@ -73,6 +75,34 @@ class Skill(Protocol):
 
     def conclude(self, own: Own) -> None:
         """Called after the setpoint has been sent, when something new was received: nobody waits for it."""
+        ...
+
+    @property
+    def record_layout(self) -> Layout:
+        """Of what `recorded_frame` gives, one frame in a stack."""
+        ...
+
+    def keep_records(self) -> None:
+        """Its decisions will be noted; before anything is received."""
+        ...
+
+    def recorded_frame(self, own: Own, flown: Velocity, time_us: int, *, is_flying: bool) -> Floats:
+        """The newest frame of what the last decision was made on, or would have been; called once after each.
+
+        Args:
+            own: telemetry.
+            flown: what was sent after it, or how the vehicle moves.
+            time_us: the companion's own clock.
+            is_flying: the companion flies.
+        """
+        ...
+
+    def recorded_goal(self, own: Own) -> Vector:
+        """Where it goes: north, east [m], and down [m] or the heading there [rad]; NaN: nowhere."""
+        ...
+
+    def recorded_image(self) -> NDArray[np.uint8] | None:
+        """The image that was looked at; None: none was."""
         ...
 
     def hint(self, trouble: str) -> str:

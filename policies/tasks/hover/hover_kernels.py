@@ -8,7 +8,7 @@ place     wind, sensors and mass, the first vector
 
 import warp as wp
 
-from autopilot.ports import SETPOINT_RATE, Setpoint
+from autopilot.ports import SETPOINT_RATE, Estimate, Setpoint
 from policies.tasks.episode import (
     HIT_OBSTACLE,
     LOST,
@@ -78,21 +78,47 @@ def act(buffers: StepBuffers, rig: RigArrays, state: HoverState) -> None:
 
 
 @wp.func
+def write_hover(
+    estimate: Estimate, point_ned: wp.vec3, last_action: wp.vec4, out: wp.array2d(dtype=float), i: int, at: int
+) -> None:
+    """The elements of a frame into row i from column `at`: the point and the motion as the body sees them."""
+    q = estimate.q_ned_from_frd
+    to_point_frd = wp.quat_rotate_inv(q, point_ned - estimate.pos_ned)
+    vel_frd = wp.quat_rotate_inv(q, estimate.vel_ned)
+    down_frd = wp.quat_rotate_inv(q, wp.vec3(0.0, 0.0, 1.0))
+    for k in range(3):
+        out[i, at + k] = to_point_frd[k]
+        out[i, at + 3 + k] = vel_frd[k]
+        out[i, at + 6 + k] = down_frd[k]
+        out[i, at + 9 + k] = estimate.omega_frd[k]
+    for k in range(4):
+        out[i, at + 12 + k] = last_action[k]
+
+
+@wp.func
+def hover_reward(params: HoverParams, distance_m: float, omega_frd: wp.vec3) -> float:
+    """Of one decision after which the vehicle is so far from the point and turns so fast."""
+    return 1.0 - distance_m / params.ball_m - params.rate_cost * wp.length(omega_frd)
+
+
+@wp.func
+def hover_outcome(params: HoverParams, distance_m: float, has_touched_any: bool, step: int) -> int:
+    """How the episode stands after decision `step`, counted from 1."""
+    if has_touched_any:
+        return HIT_OBSTACLE
+    if distance_m > params.ball_m:
+        return LOST
+    if float(step) >= params.step_limit:
+        return SUCCESS
+    return RUNNING
+
+
+@wp.func
 def write_frame(buffers: StepBuffers, rig: RigArrays, state: HoverState, i: int) -> None:
     """What the policy may know: the estimate and its own last action."""
     at = open_frame(buffers, i)
     estimate = vehicle_estimate(rig, i, state.has_estimator)
-    q = estimate.q_ned_from_frd
-    to_point_frd = wp.quat_rotate_inv(q, POINT_NED - estimate.pos_ned)
-    vel_frd = wp.quat_rotate_inv(q, estimate.vel_ned)
-    down_frd = wp.quat_rotate_inv(q, wp.vec3(0.0, 0.0, 1.0))
-    for k in range(3):
-        buffers.observations[i, at + k] = to_point_frd[k]
-        buffers.observations[i, at + 3 + k] = vel_frd[k]
-        buffers.observations[i, at + 6 + k] = down_frd[k]
-        buffers.observations[i, at + 9 + k] = estimate.omega_frd[k]
-    for k in range(4):
-        buffers.observations[i, at + 12 + k] = state.actions[i][k]
+    write_hover(estimate, POINT_NED, state.actions[i], buffers.observations, i, at)
 
 
 @wp.kernel(enable_backward=False)
@@ -102,14 +128,8 @@ def judge(buffers: StepBuffers, rig: RigArrays, state: HoverState, start: Start)
     params = state.params[i]
     truth = rig.truth[i]
     distance_m = wp.length(truth.pos_ned - POINT_NED)
-    reward = 1.0 - distance_m / params.ball_m - params.rate_cost * wp.length(truth.omega_frd)
-    outcome = int(RUNNING)
-    if has_touched(truth):
-        outcome = HIT_OBSTACLE
-    elif distance_m > params.ball_m:
-        outcome = LOST
-    elif float(buffers.steps[i] + 1) >= params.step_limit:
-        outcome = SUCCESS
+    reward = hover_reward(params, distance_m, truth.omega_frd)
+    outcome = hover_outcome(params, distance_m, has_touched(truth), buffers.steps[i] + 1)
     write_frame(buffers, rig, state, i)
     start.is_starting[i] = close_step_in_time(buffers, i, reward, outcome)
 

@@ -1,0 +1,1 @@
+"""`honeyguide dataset`: datasets of flights and episodes, from which policies are trained without flying."""

@@ -1,0 +1,176 @@
+"""The commands of `honeyguide dataset`: build, collect, show, merge, split, filter, export."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich.console import Console
+
+from mission.console.command_refusal import learn_extra, refuse
+from mission.console.name_checks import check_task
+from mission.console.terminal import loading
+
+app = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help="Datasets of flights and episodes, to train from without flying."
+)
+
+_Out = Annotated[Path, typer.Option("--output", "-o", help="The folder to make: a Minari dataset.")]
+_Source = Annotated[Path, typer.Argument(help="A dataset's folder.")]
+_EnvArgs = Annotated[list[str] | None, typer.Option(help="A setting of the task: KEY=VALUE, as stack=3. Repeatable.")]
+_Seed = Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of all draws.")]
+
+
+@contextmanager
+def _refusing() -> Iterator[None]:
+    """What a user can get wrong gives one sentence."""
+    with learn_extra():
+        from mission.train.play import PlayError
+        from mission.video.video_file import VideoError
+        from policies.datasets.episodes import DatasetError
+        from policies.experts.catalogue import NoExpert
+        from policies.experts.demonstration_file import DemonstrationFileError
+        from policies.tasks.catalogue import UnknownTask
+        from policies.tasks.layout import LayoutError
+        from policies.tasks.task_params import NumberError
+
+        try:
+            yield
+        except (DatasetError, DemonstrationFileError, LayoutError, NoExpert, NumberError, PlayError) as error:
+            refuse(str(error))
+        except (UnknownTask, VideoError) as error:
+            refuse(str(error))
+
+
+@app.command()
+def build(
+    sources: Annotated[list[Path], typer.Argument(help="Logs (.ulg, .tlog), folders of runs, or folders of those.")],
+    task: Annotated[str, typer.Option(help="FollowMe, Navigate, NavigateRover, Drive or Hover.")],
+    output: _Out,
+    env_args: _EnvArgs = None,
+    truth: Annotated[
+        bool, typer.Option("--truth/--no-truth", help="Rewards by the simulator's truth, where all logs hold it.")
+    ] = True,
+    others: Annotated[
+        bool, typer.Option("--others", help="Count what another flew while the companion looked on, too.")
+    ] = False,
+    number: Annotated[
+        list[str] | None, typer.Option(help="A number of the task, as its reward weighs: NAME=VALUE. Repeatable.")
+    ] = None,
+    images: Annotated[bool, typer.Option("--images", help="Keep the pictures beside the observations.")] = False,
+) -> None:
+    """Build a dataset from logged flights."""
+    with _refusing():
+        with loading(Console()):
+            from mission.dataset.build import BuildOptions, build_dataset
+
+        chosen = (truth, others, images, tuple(number or ()))
+        options = BuildOptions(tuple(sources), task, output, tuple(env_args or ()), *chosen)
+        build_dataset(options, Console())
+
+
+@app.command()
+def collect(
+    task: Annotated[str, typer.Argument(help="A task's name, or module:Class of your own.")],
+    policy: Annotated[str, typer.Option(help="Who drives: a policy, or 'expert' or 'random'.")],
+    output: _Out,
+    episodes: Annotated[int, typer.Option(min=1, max=10_000_000, help="How many.")] = 100,
+    noise: Annotated[
+        float, typer.Option(min=0.0, max=2.0, help="On its actions: standard deviation; of choices how often.")
+    ] = 0.0,
+    env_args: _EnvArgs = None,
+    seed: _Seed = 0,
+) -> None:
+    """Collect episodes of the batch simulator as a dataset."""
+    with _refusing():
+        check_task(task)
+        with loading(Console()):
+            from mission.dataset.collect import CollectOptions, collect_dataset
+
+        options = CollectOptions(task, policy, episodes, output, noise, seed, tuple(env_args or ()))
+        collect_dataset(options, Console())
+
+
+@app.command()
+def show(
+    dataset: _Source,
+    picture: Annotated[Path | None, typer.Option(help="Write histograms as a PNG.")] = None,
+    mp4: Annotated[Path | None, typer.Option(help="Write a film of an episode.")] = None,
+    episode: Annotated[int, typer.Option(min=0, help="Which episode the film shows.")] = 0,
+) -> None:
+    """Show what a dataset comes to: statistics, histograms, a film of an episode."""
+    with _refusing():
+        from mission.dataset.show import show_dataset
+
+        show_dataset(dataset, Console(), picture=picture, film=mp4, episode=episode)
+
+
+@app.command()
+def merge(
+    datasets: Annotated[list[Path], typer.Argument(help="Datasets of one task and layout.")], output: _Out
+) -> None:
+    """Make one dataset of several."""
+    with _refusing():
+        from policies.datasets.editing import merge as merged
+
+        typer.echo(f"{output}: {merged(datasets, output)} episodes")
+
+
+@app.command()
+def split(
+    dataset: _Source,
+    output: Annotated[list[Path], typer.Option("--output", "-o", help="The two folders to make.")],
+    fraction: Annotated[float, typer.Option(min=0.0, max=1.0, help="Of the episodes, that go to the first.")] = 0.9,
+    seed: _Seed = 0,
+) -> None:
+    """Split a dataset by whole episodes."""
+    if len(output) != 2:
+        refuse(f"-o: a split makes two folders, and {len(output)} are named")
+    with _refusing():
+        from policies.datasets.editing import split as split_in_two
+
+        counts = split_in_two(dataset, fraction, seed, (output[0], output[1]))
+        typer.echo(", ".join(f"{folder}: {count} episodes" for folder, count in zip(output, counts, strict=True)))
+
+
+@app.command(name="filter")
+def filter_episodes(
+    dataset: _Source,
+    output: _Out,
+    outcome: Annotated[list[str] | None, typer.Option(help="Keep episodes that ended so: success. Repeatable.")] = None,
+    min_return: Annotated[float | None, typer.Option(help="Keep episodes of at least this return.")] = None,
+    min_steps: Annotated[int | None, typer.Option(min=1, help="Keep episodes of at least so many decisions.")] = None,
+) -> None:
+    """Keep some of a dataset's episodes."""
+    with _refusing():
+        from policies.datasets.editing import keep
+        from policies.datasets.episodes import EpisodeRows
+
+        def is_kept(episode: EpisodeRows) -> bool:
+            return (
+                (not outcome or episode.outcome in outcome)
+                and (min_return is None or float(episode.rewards.sum()) >= min_return)
+                and (min_steps is None or len(episode) >= min_steps)
+            )
+
+        typer.echo(f"{output}: {keep(dataset, output, is_kept)} episodes")
+
+
+@app.command()
+def export(
+    dataset: _Source,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The file or folder to make.")],
+    to: Annotated[Literal["d4rl", "lerobot"], typer.Option(help="d4rl: one HDF5 file; lerobot: a parquet folder.")],
+) -> None:
+    """Export a dataset for the tools of others."""
+    with _refusing():
+        from policies.datasets.exporting import export_d4rl, export_lerobot
+
+        try:
+            steps = export_d4rl(dataset, output) if to == "d4rl" else export_lerobot(dataset, output)
+        except ModuleNotFoundError as error:
+            if error.name != "pyarrow":
+                raise
+            refuse("--to lerobot: this needs pyarrow, which comes with the extra 'lerobot' (docs/start/installing.md)")
+        typer.echo(f"{output}: {steps} decisions")

@@ -1,0 +1,71 @@
+"""Datasets made from datasets: merged, split, filtered. Episodes pass through one at a time and stay as they are."""
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from policies.datasets.episodes import DatasetError, DatasetOrigin, EpisodeRows
+from policies.datasets.reader import DatasetReader
+from policies.datasets.writer import DatasetWriter
+
+
+def merge(sources: Sequence[Path], folder: Path) -> int:
+    """One dataset of the episodes of several, in order; returns how many there are.
+
+    Raises:
+        DatasetError: they are of different tasks, versions or presets, or one cannot be read or written.
+        LayoutError: their layouts differ.
+    """
+    with ExitStack() as held:
+        readers = [held.enter_context(DatasetReader(source)) for source in sources]
+        first = readers[0]
+        for reader in readers[1:]:
+            first.layout.require(reader.layout, str(reader.folder))
+        with DatasetWriter(folder, _merged([reader.origin for reader in readers])) as writer:
+            for reader in readers:
+                writer.add_all(reader)
+        return writer.episodes
+
+
+def _merged(origins: Sequence[DatasetOrigin]) -> DatasetOrigin:
+    """What several datasets are of; where they differ, both is said."""
+    first = origins[0]
+    pilots = "+".join(sorted({origin.pilot for origin in origins}))
+    rewards_by = "+".join(sorted({origin.rewards_by for origin in origins}))
+    return replace(first, pilot=pilots, rewards_by=rewards_by)
+
+
+def split(source: Path, fraction: float, seed: int, folders: tuple[Path, Path]) -> tuple[int, int]:
+    """Two datasets: a fraction of the episodes, drawn by the seed, and the others; returns how many each has.
+
+    Raises:
+        DatasetError: one of them would have none, or it cannot be read or written.
+    """
+    with DatasetReader(source) as reader:
+        first = round(fraction * reader.count)
+        if not 0 < first < reader.count:
+            raise DatasetError(
+                f"{source}: a fraction of {fraction:g} of {reader.count} episodes leaves one part without any"
+            )
+        order = np.random.default_rng(seed).permutation(reader.count)
+        chosen = set(order[:first].tolist())
+        with DatasetWriter(folders[0], reader.origin) as one, DatasetWriter(folders[1], reader.origin) as other:
+            for k, episode in enumerate(reader):
+                (one if k in chosen else other).add(episode)
+    return one.episodes, other.episodes
+
+
+def keep(source: Path, folder: Path, is_kept: Callable[[EpisodeRows], bool]) -> int:
+    """A dataset of the episodes that are to be kept; returns how many they are.
+
+    Raises:
+        DatasetError: none is, or it cannot be read or written.
+    """
+    with DatasetReader(source) as reader, DatasetWriter(folder, reader.origin) as writer:
+        writer.add_all(filter(is_kept, reader))
+        if not writer.episodes:
+            raise DatasetError(f"{source}: no episode passes the filter")
+    return writer.episodes
