@@ -312,6 +312,8 @@ class Training:
         require_fit(settings_that_must_fit(self.config, self.task_settings), content["must_fit"], str(path))
         try:
             self.learner.load_state(content["learner"])
+        except CheckpointError as error:
+            raise CheckpointError(f"{path}: {error}") from None
         except (KeyError, RuntimeError, ValueError) as error:  # rows or buffers that this version has otherwise
             raise CheckpointError(
                 f"{path}: the state of its task was saved by another version of honeyguide; "

@@ -44,5 +44,7 @@ class NetworkSettings(Block):
     """Whether `--inference` takes the most probable actions instead of drawing them; training draws."""
     memory: Memory | None = None
     """LSTM; none: feed-forward."""
+    mixture: Count = own_key(1)
+    """Gaussians that continuous actions are a mixture of, for `trainer_type: bc`; the likeliest one acts."""
     perceives: tuple[str, ...] = own_key(())
     """Privileged elements of the task that the policy also says its belief of; learnt beside a teacher."""

@@ -75,9 +75,14 @@ class Body(nn.Module):
             if observation.image is None:
                 raise ValueError("this network sees an image, and was given none")
             features = torch.cat((self.encoder(observation.image), features), dim=-1)
+        features = self.hidden(features)
+        return features if self.hyper is None else F.silu(self.hyper(features, goals))
+
+    def hidden(self, features: Tensor) -> Tensor:
+        """What the dense layers make of normalised floats, behind the image's features, shape (..., hidden units)."""
         for layer in self.layers:
             features = F.silu(layer(features))
-        return features if self.hyper is None else F.silu(self.hyper(features, goals))
+        return features
 
     def step(self, observations: Tensor | Observation, memory: Tensor) -> tuple[Tensor, Tensor]:
         """Features (rows, size) and the memory after them (rows, memory); no columns without memory."""
