@@ -32,6 +32,8 @@ def settings_that_must_fit(config: RunConfig, settings: TaskSettings) -> dict[st
     network = behavior.network_settings.model_dump(exclude={"deterministic"})
     if network["mixture"] == 1:  # checkpoints of before there were mixtures do not have it
         del network["mixture"]
+    if network["memory"] and network["memory"]["memory_type"] == "lstm":  # nor what a transformer has
+        network["memory"] = {key: network["memory"][key] for key in ("sequence_length", "memory_size")}
     signals = {name: signal.model_dump() for name, signal in behavior.reward_signals.in_use.items()}
     return flat(
         {

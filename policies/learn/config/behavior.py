@@ -275,9 +275,12 @@ class Behavior(Block):
         return self
 
     @model_validator(mode="after")
-    def _mixtures_are_cloned(self) -> Self:
-        if self.network_settings.mixture > 1 and self.trainer_type != "bc":
-            raise ValueError(f"network_settings: mixture: is not supported with trainer_type {self.trainer_type}")
+    def _only_cloned(self) -> Self:
+        network = self.network_settings
+        has_transformer = network.memory is not None and network.memory.memory_type == "transformer"
+        for is_asked, what in ((network.mixture > 1, "mixture"), (has_transformer, "memory.memory_type transformer")):
+            if is_asked and self.trainer_type != "bc":
+                raise ValueError(f"network_settings: {what}: is for trainer_type bc, not for {self.trainer_type}")
         return self
 
     @model_validator(mode="after")
