@@ -14,13 +14,14 @@ from policies.learn.algorithms.learner import Learner
 from policies.learn.algorithms.ppo import Ppo
 from policies.learn.algorithms.sac import Sac
 from policies.learn.algorithms.teacher import load_teacher
-from policies.learn.config.behavior import Behavior, DaggerHyperparameters, PpoHyperparameters
+from policies.learn.config.behavior import Behavior, DaggerHyperparameters, PpoHyperparameters, SacHyperparameters
 from policies.learn.config.offline import OfflineHyperparameters
 from policies.learn.config.run import RunConfig
 from policies.learn.networks.policy import Policy
 from policies.learn.rollout.demonstrations import load_demonstrations
 from policies.learn.signals.build_signals import build_signals
-from policies.offline.build_offline import build_offline_learner
+from policies.offline.build_offline import build_offline_learner, open_offline_store
+from policies.offline.conservative_start import ConservativeStart
 from policies.tasks.task import Task
 
 
@@ -40,8 +41,10 @@ def build_learner(config: RunConfig, task: Task, seed: int) -> Learner:
         SacError: what soft actor-critic does not do.
     """
     behavior = config.behavior
-    is_sac, hyperparameters = behavior.trainer_type == "sac", behavior.hyperparameters
-    is_squashed = is_sac or (isinstance(hyperparameters, OfflineHyperparameters) and hyperparameters.is_squashed)
+    hyperparameters = behavior.hyperparameters
+    is_squashed = isinstance(hyperparameters, SacHyperparameters) or (
+        isinstance(hyperparameters, OfflineHyperparameters) and hyperparameters.is_squashed
+    )
     generator = torch.Generator().manual_seed(seed)
     policy = Policy(task.layout, behavior.network_settings, generator, is_squashed=is_squashed).to(task.device)
     if isinstance(hyperparameters, OfflineHyperparameters):
@@ -51,8 +54,13 @@ def build_learner(config: RunConfig, task: Task, seed: int) -> Learner:
         return Dagger(task, policy, behavior, teacher, seed=seed)
     signals = build_signals(behavior.reward_signals, task.layout, seed, task.device)
     cloning = _cloning(behavior, policy, seed, task.device)
-    algorithm = Sac if is_sac else Ppo
-    return algorithm(task, policy, behavior, signals, seed=seed, cloning=cloning)
+    if isinstance(hyperparameters, SacHyperparameters):
+        start = None
+        if behavior.offline is not None:
+            store = open_offline_store(behavior.offline, task.layout)
+            start = ConservativeStart(store, hyperparameters, task.device)
+        return Sac(task, policy, behavior, signals, seed=seed, cloning=cloning, start=start)
+    return Ppo(task, policy, behavior, signals, seed=seed, cloning=cloning)
 
 
 def remarks(behavior: Behavior, env_count: int) -> Iterator[str]:

@@ -109,6 +109,8 @@ class ActionHeads(nn.Module):
             self.log_sigma = sigma or nn.Parameter(torch.zeros(continuous_size))
         is_mixture = self.component_count > 1
         self.mixture = dense(features, self.component_count, generator, gain=0.1) if is_mixture else None
+        if is_mixture and self.mean is not None:  # components that began alike would stay alike
+            nn.init.normal_(self.mean.bias, std=0.5, generator=generator)
         self.logits = dense(features, sum(branch_sizes), generator, gain=0.1) if branch_sizes else None
 
     def forward(self, features: Tensor) -> ActionDistribution:

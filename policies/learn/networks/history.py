@@ -26,6 +26,7 @@ class Attention(nn.Module):
         self.first_norm, self.second_norm = nn.LayerNorm(width), nn.LayerNorm(width)
         self.queries, self.keys, self.values, self.mix = (dense(width, width, generator) for _ in range(4))
         self.ago = nn.Parameter(torch.zeros(heads, context))  # added to the score of what was so many decisions ago
+        self.nothing = nn.Parameter(torch.zeros(heads, 1, 1))  # score of looking at nothing: tells one past from none
         self.widen = dense(width, _WIDENING * width, generator)
         self.narrow = dense(_WIDENING * width, width, generator, gain=0.5)
 
@@ -41,7 +42,9 @@ class Attention(nn.Module):
         queries, keys, values = (self._split(layer(inputs)) for layer in (self.queries, self.keys, self.values))
         scores = queries @ keys.transpose(-1, -2) / math.sqrt(queries.shape[-1])
         scores = scores + self.ago[:, distances] + forbidden[:, None]
-        mixed = (scores.softmax(dim=-1) @ values).transpose(1, 2).flatten(2)
+        nothing = self.nothing.expand(len(scores), -1, scores.shape[2], -1)
+        weights = torch.cat((scores, nothing), dim=-1).softmax(dim=-1)[..., :-1]
+        mixed = (weights @ values).transpose(1, 2).flatten(2)
         tokens = tokens + self.mix(mixed)
         outputs: Tensor = tokens + self.narrow(F.silu(self.widen(self.second_norm(tokens))))
         return outputs
