@@ -32,7 +32,7 @@ class OfflineAlgorithm(Protocol):
         ...
 
     def state(self) -> dict[str, Any]:
-        """Networks other than the policy, and optimisers; critics, if there are any, as SAC keeps them."""
+        """Networks other than the policy, optimisers, generators; critics, if there are any, as SAC keeps them."""
         ...
 
     def load_state(self, state: Mapping[str, Any]) -> None:

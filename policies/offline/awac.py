@@ -77,14 +77,19 @@ class Awac:
         self._optimizer.set_learning_rate(learning_rate)
 
     def state(self) -> dict[str, Any]:
-        """Critics and Adam."""
-        return {**self._critics.state(), "optimizer": self._optimizer.state()}
+        """Critics, Adam and the generator of draws."""
+        return {
+            **self._critics.state(),
+            "optimizer": self._optimizer.state(),
+            "generator": self._generator.get_state(),
+        }
 
     def load_state(self, state: Mapping[str, Any]) -> None:
         """Goes on from what `state` returned."""
         self._batches.refresh()
         self._critics.load_state(state)
         self._optimizer.load_state(state["optimizer"])
+        self._generator.set_state(state["generator"].cpu())
 
     def take_critics(self, state: Mapping[str, Any]) -> None:
         """Starts from another run's critics if they fit."""

@@ -22,7 +22,7 @@ from policies.offline.awac import Awac
 from policies.offline.cloning import StoreCloning
 from policies.offline.iql import Iql
 from policies.offline.learner import OfflineLearner
-from policies.offline.store import OfflineStore, open_store
+from policies.offline.store import MEMORY_LIMIT, OfflineStore, open_store
 from policies.offline.td3_bc import Td3Bc
 from policies.tasks.catalogue import settings_of
 from policies.tasks.layout import Layout
@@ -89,7 +89,8 @@ def open_offline_store(settings: OfflineSettings, layout: Layout) -> OfflineStor
         DemonstrationError: datasets that cannot be read.
         LayoutError: datasets of another task.
     """
-    return open_store(settings.dataset, layout, cache=Path(settings.cache) if settings.cache else None)
+    cache = Path(settings.cache) if settings.cache else None
+    return open_store(settings.dataset, layout, cache=cache, memory_limit=MEMORY_LIMIT)
 
 
 def _judge(config: RunConfig, seed: int) -> Callable[[Policy], Evaluation]:

@@ -97,7 +97,7 @@ class Td3Bc:
         self._policy_optimizer.set_learning_rate(learning_rate)
 
     def state(self) -> dict[str, Any]:
-        """Critics, targets and both Adams."""
+        """Critics, targets, both Adams and the generator of noise."""
         return {
             **self._critics.state(),
             "target_policy": self._target_policy.state_dict(),
@@ -105,6 +105,7 @@ class Td3Bc:
             "policy_optimizer": self._policy_optimizer.state(),
             "step_count": self._step_count,
             "policy_loss": self._policy_loss,
+            "generator": self._generator.get_state(),
         }
 
     def load_state(self, state: Mapping[str, Any]) -> None:
@@ -115,6 +116,7 @@ class Td3Bc:
         self._critic_optimizer.load_state(state["critic_optimizer"])
         self._policy_optimizer.load_state(state["policy_optimizer"])
         self._step_count = state["step_count"]
+        self._generator.set_state(state["generator"].cpu())
         self._policy_loss = state["policy_loss"].to(self._target_vector.device)
 
     def take_critics(self, state: Mapping[str, Any]) -> None:
