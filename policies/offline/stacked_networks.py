@@ -39,12 +39,17 @@ class StackedNetworks(nn.Module):
     def forward(self, inputs: Tensor, count: int | None = None) -> Tensor:
         """What networks make of the same inputs (B, inputs), shape (networks, B, outputs): all, or the first ones."""
         features = inputs.expand(count or len(self.weights[0]), *inputs.shape)
-        last = len(self.weights) - 1
-        for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            features = torch.baddbmm(bias[:count], features, weight[:count])
-            if k < last:
-                features = F.silu(features)
-        return features
+        *hidden, (weight, bias) = self._layers(count)
+        for hidden_weight, hidden_bias in hidden:
+            features = F.silu(torch.baddbmm(hidden_bias, features, hidden_weight))
+        if weight.shape[-1] > 1:
+            return torch.baddbmm(bias, features, weight)
+        return (features * weight.transpose(1, 2)).sum(dim=-1, keepdim=True) + bias  # a product of one column is slow
+
+    def _layers(self, count: int | None) -> list[tuple[Tensor, Tensor]]:
+        """Weights and biases of all networks, or of the first ones."""
+        layers = list(zip(self.weights, self.biases, strict=True))
+        return layers if count is None else [(weight[:count], bias[:count]) for weight, bias in layers]
 
     def sac_record(self) -> dict[str, Tensor]:
         """The networks as soft actor-critic names its critics."""
