@@ -179,6 +179,8 @@ class Training:
             iteration = self.learner.iterate()
             steps = self.learner.steps
             self.period.add(iteration.scores, iteration.statistics)
+            if iteration.is_evaluation:
+                self.recent.clear()
             self.recent.add(iteration.scores)
             self._moments.append((wall_time_s(), steps))
             self.watcher.show(self._progress())

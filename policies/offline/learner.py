@@ -82,9 +82,10 @@ class OfflineLearner:
         scores = _NO_SCORES
         interval = self._settings.evaluation_interval
         is_due = self.steps // interval > before // interval or self.steps >= self._behavior.max_steps
-        if self._settings.evaluation_episodes and is_due:
+        is_evaluation = bool(self._settings.evaluation_episodes) and is_due
+        if is_evaluation:
             scores = self._evaluate(statistics)
-        return Iteration(steps, scores, statistics)
+        return Iteration(steps, scores, statistics, is_evaluation)
 
     def _evaluate(self, statistics: dict[str, float]) -> Scores:
         """Plays the policy; its mean return and score become statistics."""
