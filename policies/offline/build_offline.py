@@ -20,6 +20,7 @@ from policies.learn.networks.policy import Policy
 from policies.offline.algorithm import NormalizedBatches, OfflineAlgorithm, OfflineError
 from policies.offline.awac import Awac
 from policies.offline.cloning import StoreCloning
+from policies.offline.initial_weights import draw_policy
 from policies.offline.iql import Iql
 from policies.offline.learner import OfflineLearner
 from policies.offline.store import MEMORY_LIMIT, OfflineStore, open_store
@@ -56,7 +57,7 @@ def build_offline_learner(config: RunConfig, policy: Policy, seed: int) -> Offli
 
 
 def build_algorithm(behavior: Behavior, policy: Policy, store: OfflineStore, seed: int) -> OfflineAlgorithm:
-    """The algorithm of a behaviour on a store; the policy's normaliser has its statistics already.
+    """The algorithm of a behaviour on a store; the policy's normaliser has its statistics already, its weights not.
 
     Raises:
         OfflineError: what the algorithm does not do.
@@ -68,6 +69,7 @@ def build_algorithm(behavior: Behavior, policy: Policy, store: OfflineStore, see
         others = ", ".join(name for name in signals if name != "extrinsic") or "none"
         raise OfflineError(f"reward_signals: {behavior.trainer_type} takes extrinsic alone, and there is {others}")
     generators = torch.Generator().manual_seed(seed + _CRITIC_SEED), torch.Generator(device).manual_seed(seed)
+    draw_policy(policy, generators[0])
     batches = NormalizedBatches(store, policy, extrinsic.strength)
     match behavior.hyperparameters:
         case BcHyperparameters() as settings:

@@ -12,7 +12,7 @@ import torch.nn.functional as F  # noqa: N812  (the name of the field)
 from torch import Tensor, nn
 
 from policies.learn.config.network import NetworkSettings
-from policies.learn.networks.dense_layers import dense, value_heads
+from policies.offline.initial_weights import uniform
 from policies.tasks.layout import Layout
 
 
@@ -25,16 +25,14 @@ class StackedNetworks(nn.Module):
         Args:
             count: networks side by side.
             sizes: of inputs, of each hidden layer, of outputs.
-            generator: draws the weights, network by network.
+            generator: draws the weights.
         """
         super().__init__()
-        networks = [
-            [*(dense(a, b, generator) for a, b in pairwise(sizes[:-1])), value_heads(sizes[-2], sizes[-1], generator)]
-            for _ in range(count)
+        layers = [
+            (uniform((count, a, b), a, generator), uniform((count, 1, b), a, generator)) for a, b in pairwise(sizes)
         ]
-        layers = list(zip(*networks, strict=True))
-        self.weights = nn.ParameterList(torch.stack([each.weight.detach().T for each in layer]) for layer in layers)
-        self.biases = nn.ParameterList(torch.stack([each.bias.detach()[None] for each in layer]) for layer in layers)
+        self.weights = nn.ParameterList(weight for weight, _ in layers)
+        self.biases = nn.ParameterList(bias for _, bias in layers)
 
     def forward(self, inputs: Tensor, count: int | None = None) -> Tensor:
         """What networks make of the same inputs (B, inputs), shape (networks, B, outputs): all, or the first ones."""
