@@ -92,18 +92,11 @@ class Sac:
         weights = torch.Generator().manual_seed(seed)
         self.networks = SoftActorCritic(self.policy, self.hyperparameters, self.signals, weights)
         self._generator = torch.Generator(device).manual_seed(seed)
-        layout = task.layout
-        sizes = len(layout.continuous), len(layout.branches)
-        self.replay = Replay(self.hyperparameters.buffer_size, task.env_count, layout.observation_size, sizes, device)
-        if self.replay.capacity < self.hyperparameters.batch_size:
-            raise SacError(
-                f"hyperparameters: buffer_size: {self.hyperparameters.buffer_size} holds {self.replay.capacity} steps "
-                f"in whole rounds of {task.env_count} environments: never a batch of {self.hyperparameters.batch_size}"
-            )
-        if start is not None and self.hyperparameters.hindsight:
-            raise SacError("hyperparameters: hindsight: cannot be with a dataset, whose goals it does not know")
+        self.replay = _replay(task, self.hyperparameters, device)
         self._start = start
         if start is not None:
+            if self.hyperparameters.hindsight:
+                raise SacError("hyperparameters: hindsight: cannot be with a dataset, whose goals it does not know")
             start.fill(self.replay, self._generator)
         self._hindsight = _hindsight(task, self.replay, self.hyperparameters.hindsight)
         self._radii = _task_param(task, self._hindsight.goal.radius) if self._hindsight is not None else None
@@ -266,6 +259,19 @@ class Sac:
             self.replay.load_state(state["replay"])
             if self._hindsight is not None:
                 self._hindsight.load_state(state["hindsight"])
+
+
+def _replay(task: Task, hyperparameters: SacHyperparameters, device: torch.device) -> Replay:
+    """An empty buffer."""
+    layout = task.layout
+    sizes = len(layout.continuous), len(layout.branches)
+    replay = Replay(hyperparameters.buffer_size, task.env_count, layout.observation_size, sizes, device)
+    if replay.capacity < hyperparameters.batch_size:
+        raise SacError(
+            f"hyperparameters: buffer_size: {hyperparameters.buffer_size} holds {replay.capacity} steps "
+            f"in whole rounds of {task.env_count} environments: never a batch of {hyperparameters.batch_size}"
+        )
+    return replay
 
 
 def _hindsight(task: Task, replay: Replay, goals_per_transition: int) -> Hindsight | None:
