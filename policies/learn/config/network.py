@@ -57,7 +57,7 @@ class NetworkSettings(Block):
     """Privileged elements of the task that the policy also says its belief of; learnt beside a teacher."""
 
     @model_validator(mode="after")
-    def _heads_share_the_width(self) -> Self:
+    def _heads_split_the_width(self) -> Self:
         memory = self.memory
         if memory is not None and memory.memory_type == "transformer":
             if self.hidden_units % memory.heads:
