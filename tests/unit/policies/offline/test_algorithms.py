@@ -60,12 +60,12 @@ def actions_of(policy, observations):
     [
         ("bc", {}, 0.0),
         ("td3_bc", {"alpha": 10.0}, 0.5),
-        ("iql", {"inverse_temperature": 20.0}, 0.5),
+        ("iql", {"inverse_temperature": 5.0}, 0.5),
         ("awac", {"inverse_temperature": 20.0}, 0.5),
     ],
 )
 def test_the_push_that_paid_is_found(bandit, trainer, hyperparameters, expected, actions):
-    policy, _ = trained(behavior(trainer, actions=actions, **hyperparameters), bandit, 400)
+    policy, _ = trained(behavior(trainer, actions=actions, **hyperparameters), bandit, 600)
     observations = torch.randn(200, 2, generator=torch.Generator().manual_seed(3))
     pushes, _ = actions_of(policy, observations)
     assert pushes.mean().item() == pytest.approx(expected, abs=0.15)
