@@ -34,6 +34,7 @@ SCRIPTS = {
     "environments": "bench.learning.environments",
     "training": "bench.learning.training",
     "sac": "bench.learning.sac",
+    "offline": "bench.learning.offline",
     "companion": "bench.learning.companion",
     "tracker": "bench.learning.tracker",
     "camera": "bench.flying.camera",

@@ -5,7 +5,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from policies.learn.config import behavior, environment, network, run, signals
+from policies.learn.config import behavior, environment, network, offline, run, signals
 from policies.learn.config.command_line import flags
 
 HEADER = """\
@@ -60,6 +60,11 @@ BLOCKS: Mapping[str, type[BaseModel]] = {
     "hyperparameters of sac": behavior.SacHyperparameters,
     "hyperparameters of dagger": behavior.DaggerHyperparameters,
     "hyperparameters of dagger: augmentation": behavior.Augmentation,
+    "hyperparameters of bc": offline.BcHyperparameters,
+    "hyperparameters of td3_bc": offline.Td3BcHyperparameters,
+    "hyperparameters of iql": offline.IqlHyperparameters,
+    "hyperparameters of awac": offline.AwacHyperparameters,
+    "offline": offline.OfflineSettings,
     "network_settings": network.NetworkSettings,
     "network_settings: memory": network.Memory,
     "reward_signals: extrinsic": signals.ExtrinsicSettings,

@@ -29,6 +29,7 @@ from policies.learn.rollout.demonstrations import DemonstrationError
 from policies.learn.trainer import Progress as TrainingProgress
 from policies.learn.trainer import Result, train
 from policies.learn.training_run_folder import RunError, RunFolder
+from policies.offline.algorithm import OfflineError
 from policies.tasks.catalogue import (
     CATALOGUE,
     GYM,
@@ -43,8 +44,8 @@ from policies.tasks.layout import LayoutError
 from policies.tasks.task_params import NumberError
 
 USER_ERRORS = (
-    CheckpointError, ConfigError, DemonstrationError, ExportError, LayoutError, NumberError, RunError, SacError,
-    UnknownTask,
+    CheckpointError, ConfigError, DemonstrationError, ExportError, LayoutError, NumberError, OfflineError, RunError,
+    SacError, UnknownTask,
 )  # fmt: skip
 INFERENCE_EPISODES = 1000
 _ENDS = {"max_steps": "all steps done", "success_target": "success target reached", "stopped": "stopped by the user"}

@@ -14,7 +14,13 @@ from policies.tasks.task import TaskSettings
 _OF_PPO = ("shared_critic", "privileged_critic", "normalize_returns")
 _OF_SAC = ("buffer_size", "hindsight", "save_replay_buffer")
 _OF_DAGGER = ("buffer_size", "save_replay_buffer")
-_OF_TRAINERS = {"ppo": _OF_PPO, "sac": _OF_SAC, "dagger": _OF_DAGGER}
+_OF_OFFLINE = ("actions",)
+_OF_TRAINERS = {
+    "ppo": _OF_PPO,
+    "sac": _OF_SAC,
+    "dagger": _OF_DAGGER,
+    **dict.fromkeys(("bc", "td3_bc", "iql", "awac"), _OF_OFFLINE),
+}
 _OF_SIGNALS = ("network_settings", "use_actions", "use_vail", "normalize_reward")
 
 
@@ -23,6 +29,11 @@ def settings_that_must_fit(config: RunConfig, settings: TaskSettings) -> dict[st
     behavior = config.behavior
     names = _OF_TRAINERS[behavior.trainer_type]
     hyperparameters = behavior.hyperparameters.model_dump()
+    network = behavior.network_settings.model_dump(exclude={"deterministic"})
+    if network["mixture"] == 1:  # checkpoints of before there were mixtures do not have it
+        del network["mixture"]
+    if network["memory"] and network["memory"]["memory_type"] == "lstm":  # nor what a transformer has
+        network["memory"] = {key: network["memory"][key] for key in ("sequence_length", "memory_size")}
     signals = {name: signal.model_dump() for name, signal in behavior.reward_signals.in_use.items()}
     return flat(
         {
@@ -30,7 +41,7 @@ def settings_that_must_fit(config: RunConfig, settings: TaskSettings) -> dict[st
             "env_args": settings.model_dump(),
             "environments": config.env_settings.env_count,
             "trainer_type": behavior.trainer_type,
-            "network_settings": behavior.network_settings.model_dump(exclude={"deterministic"}),
+            "network_settings": network,
             "hyperparameters": {name: hyperparameters[name] for name in names},
             "reward_signals": {
                 name: {key: signal[key] for key in _OF_SIGNALS if key in signal} for name, signal in signals.items()

@@ -179,6 +179,8 @@ class Training:
             iteration = self.learner.iterate()
             steps = self.learner.steps
             self.period.add(iteration.scores, iteration.statistics)
+            if iteration.is_evaluation:
+                self.recent.clear()
             self.recent.add(iteration.scores)
             self._moments.append((wall_time_s(), steps))
             self.watcher.show(self._progress())
@@ -312,6 +314,8 @@ class Training:
         require_fit(settings_that_must_fit(self.config, self.task_settings), content["must_fit"], str(path))
         try:
             self.learner.load_state(content["learner"])
+        except CheckpointError as error:
+            raise CheckpointError(f"{path}: {error}") from None
         except (KeyError, RuntimeError, ValueError) as error:  # rows or buffers that this version has otherwise
             raise CheckpointError(
                 f"{path}: the state of its task was saved by another version of honeyguide; "

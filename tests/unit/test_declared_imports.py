@@ -28,7 +28,8 @@ PLACES = {
     "engines": ("sim/engines/quiet_bullet.py", "sim/engines/quiet_jsbsim.py"),
     "gym": ("policies/__init__.py", "policies/tasks"),
     "learn": (
-        *("policies/companion", "policies/datasets", "policies/experts", "policies/learn", "policies/tracker.py"),
+        *("policies/companion", "policies/datasets", "policies/experts", "policies/learn", "policies/offline"),
+        "policies/tracker.py",
         *("policies/person_detector", "mission/benchmark/any_pilot.py"),
         *("mission/train", "mission/video/rtp_video.py", "mission/video/video_file.py"),
     ),

@@ -21,6 +21,7 @@ class Iteration:
     steps: int  # decisions collected, over all environments
     scores: Scores  # of the episodes that ended meanwhile
     statistics: Mapping[str, float]  # TensorBoard tag to value, ML-Agents' names: "Losses/Policy Loss"
+    is_evaluation: bool = False  # whether the episodes are all of one policy: those before do not count any more
 
 
 class Learner(Protocol):

@@ -37,6 +37,7 @@ from policies.learn.rollout.task_tensors import TaskTensors
 from policies.learn.signals.episode_rewards import EpisodeRewards
 from policies.learn.signals.extrinsic import ExtrinsicSignal
 from policies.learn.signals.signal import RewardSignal, Transitions
+from policies.offline.conservative_start import ConservativeStart
 from policies.tasks.episode import Outcome
 from policies.tasks.task import Task
 
@@ -59,8 +60,9 @@ class Sac:
         *,
         seed: int,
         cloning: Companion | None = None,
+        start: ConservativeStart | None = None,
     ) -> None:
-        """Resets the task and makes critics and an empty buffer.
+        """Resets the task and makes critics and a buffer.
 
         Args:
             task: its environments all belong to the learner.
@@ -69,10 +71,11 @@ class Sac:
             signals: what is rewarded.
             seed: of the task's episodes, the critics' weights, the draws of actions and of batches.
             cloning: of demonstrations, on the same policy; none: off.
+            start: a dataset that the buffer begins with, and whose actions the policy is held at; none: neither.
 
         Raises:
             SacError: a policy with memory, a buffer that never holds a batch, or hindsight where the observation tells
-                too little of the goal.
+                too little of the goal, or beside a dataset.
         """
         if not isinstance(behavior.hyperparameters, SacHyperparameters) or not policy.is_squashed:
             raise TypeError("hyperparameters or policy are not SAC's")
@@ -89,14 +92,12 @@ class Sac:
         weights = torch.Generator().manual_seed(seed)
         self.networks = SoftActorCritic(self.policy, self.hyperparameters, self.signals, weights)
         self._generator = torch.Generator(device).manual_seed(seed)
-        layout = task.layout
-        sizes = len(layout.continuous), len(layout.branches)
-        self.replay = Replay(self.hyperparameters.buffer_size, task.env_count, layout.observation_size, sizes, device)
-        if self.replay.capacity < self.hyperparameters.batch_size:
-            raise SacError(
-                f"hyperparameters: buffer_size: {self.hyperparameters.buffer_size} holds {self.replay.capacity} steps "
-                f"in whole rounds of {task.env_count} environments: never a batch of {self.hyperparameters.batch_size}"
-            )
+        self.replay = _replay(task, self.hyperparameters, device)
+        self._start = start
+        if start is not None:
+            if self.hyperparameters.hindsight:
+                raise SacError("hyperparameters: hindsight: cannot be with a dataset, whose goals it does not know")
+            start.fill(self.replay, self._generator)
         self._hindsight = _hindsight(task, self.replay, self.hyperparameters.hindsight)
         self._radii = _task_param(task, self._hindsight.goal.radius) if self._hindsight is not None else None
         self._update_count = 0
@@ -193,9 +194,15 @@ class Sac:
         """Networks, and the clone if there is one."""
         batch = self._drawn()
         goes_on = 1.0 - batch.is_terminated[:, None] * self._is_episodic
-        statistics = self.networks.update(batch, self._rewards(batch.transitions()), goes_on, self._generator)
+        rewards, held = self._rewards(batch.transitions()), self._held()
+        statistics = self.networks.update(batch, rewards, goes_on, self._generator, held)
         self._update_count += 1
         return statistics if self.cloning is None else statistics | self.cloning.update(self.steps)
+
+    def _held(self) -> tuple[ReplayBatch, float] | None:
+        """Recorded decisions, and by which weight the policy is still held at them."""
+        weight = self._start.weight(self.steps) if self._start is not None else 0.0
+        return (self._start.batch(self._generator), weight) if self._start is not None and weight else None
 
     def _update_signals(self) -> dict[str, float]:
         """Reward signals that learn."""
@@ -252,6 +259,19 @@ class Sac:
             self.replay.load_state(state["replay"])
             if self._hindsight is not None:
                 self._hindsight.load_state(state["hindsight"])
+
+
+def _replay(task: Task, hyperparameters: SacHyperparameters, device: torch.device) -> Replay:
+    """An empty buffer."""
+    layout = task.layout
+    sizes = len(layout.continuous), len(layout.branches)
+    replay = Replay(hyperparameters.buffer_size, task.env_count, layout.observation_size, sizes, device)
+    if replay.capacity < hyperparameters.batch_size:
+        raise SacError(
+            f"hyperparameters: buffer_size: {hyperparameters.buffer_size} holds {replay.capacity} steps "
+            f"in whole rounds of {task.env_count} environments: never a batch of {hyperparameters.batch_size}"
+        )
+    return replay
 
 
 def _hindsight(task: Task, replay: Replay, goals_per_transition: int) -> Hindsight | None:

@@ -28,6 +28,7 @@ from policies.learn.networks.networks import Body
 from policies.learn.networks.policy import Policy
 from policies.learn.rollout.replay_buffer import ReplayBatch
 from policies.learn.signals.signal import RewardSignal
+from policies.learn.signals.signal_losses import cloning_loss
 
 _LOSS_TAGS = ("Losses/Q1 Loss", "Losses/Q2 Loss", "Losses/Policy Loss")
 
@@ -93,7 +94,12 @@ class SoftActorCritic:
         self.optimizer = torch.optim.Adam(parameters, lr=hyperparameters.learning_rate, fused=True)
 
     def update(
-        self, batch: ReplayBatch, rewards: Tensor, goes_on: Tensor, generator: torch.Generator
+        self,
+        batch: ReplayBatch,
+        rewards: Tensor,
+        goes_on: Tensor,
+        generator: torch.Generator,
+        held: tuple[ReplayBatch, float] | None = None,
     ) -> dict[str, float]:
         """One step.
 
@@ -102,6 +108,8 @@ class SoftActorCritic:
             rewards: of each signal times its strength, shape (B, signals).
             goes_on: 0.0 where a signal expects nothing afterwards, shape (B, signals).
             generator: draws what the policy would do.
+            held: recorded decisions that the policy is held at, and by which weight against the critics' values,
+                were those of mean size 1; none: it is not.
 
         Returns:
             TensorBoard tags to values.
@@ -119,11 +127,19 @@ class SoftActorCritic:
             values = _values(self.critics, observation, drawn)
         else:
             values = values.detach()  # of all choices: the same for any action
-        policy = policy_loss(expected_values(values, distribution.choice_logs), entropy, temperatures)
+        expected = expected_values(values, distribution.choice_logs)
+        policy = policy_loss(expected, entropy, temperatures)
+        if held is not None:
+            policy = policy + held[1] * expected.detach().abs().mean() * self._apart(held[0])
         temperature = temperature_loss(self.log_temperatures, entropy, self._entropy_targets)
         self._step((critic.sum(), policy, temperature))
         hyperparameters = torch.cat((critic, policy.abs()[None], next_values.mean(dim=0))).tolist()
         return dict(zip((*_LOSS_TAGS, *self._value_tags), hyperparameters, strict=True))
+
+    def _apart(self, recorded: ReplayBatch) -> Tensor:
+        """How far the policy is from recorded actions."""
+        distribution: ActionDistribution = self.policy(recorded.observations)
+        return cloning_loss(distribution.mean.tanh(), distribution.choice_logs, recorded.continuous, recorded.branches)
 
     @torch.no_grad()
     def _next_values(self, observations: Tensor, temperatures: Tensor, generator: torch.Generator) -> Tensor:

@@ -18,7 +18,16 @@ from policies.learn.config.config_block import (
     Schedule,
     own_key,
 )
+from policies.learn.config.gradient import GradientHyperparameters
 from policies.learn.config.network import NetworkSettings
+from policies.learn.config.offline import (
+    AwacHyperparameters,
+    BcHyperparameters,
+    IqlHyperparameters,
+    OfflineHyperparameters,
+    OfflineSettings,
+    Td3BcHyperparameters,
+)
 from policies.learn.config.signals import ExtrinsicSettings, RewardSignals
 
 
@@ -27,19 +36,13 @@ def _as(key: str, otherwise: Any) -> Any:
     return Field(default_factory=lambda data: data.get(key, otherwise), json_schema_extra={"as": key})
 
 
-class HyperparametersBase(Block):
-    """What both algorithms have."""
+class HyperparametersBase(GradientHyperparameters):
+    """What algorithms have that collect their own steps."""
 
     batch_size: Count = 1024
     """Steps per gradient step."""
     buffer_size: Count = 10240
     """Steps collected before each update."""
-    learning_rate: Positive = 3e-4
-    """Of Adam, at the start."""
-    learning_rate_schedule: Schedule = "constant"
-    """`linear`: falls to 0 at max_steps."""
-    max_grad_norm: PositiveOrNone = own_key(None)
-    """Gradients are scaled down to this norm; none: not at all."""
 
     @model_validator(mode="after")
     def _batch_fits(self) -> Self:
@@ -118,6 +121,12 @@ class SacHyperparameters(HyperparametersBase):
     """Steps of experience per update of the reward signals."""
     save_replay_buffer: bool = False
     """Whether the replay buffer is saved with the checkpoints."""
+    prefill: Fraction = own_key(0.0)
+    """Fraction of the replay buffer that begins filled with decisions of the dataset that `offline` names."""
+    hold: NotNegative = own_key(0.0)
+    """Weight, at the start, of staying at the actions of that dataset; against the critics' values at mean size 1."""
+    hold_steps: NotNegativeWhole = own_key(0)
+    """Steps over which `hold` falls to 0."""
     hindsight: NotNegativeWhole = own_key(0)
     """Copies of each step in which a goal reached later in the episode stands for the goal (HER, `future`)."""
 
@@ -152,11 +161,23 @@ class DaggerHyperparameters(HyperparametersBase):
     """Whether the buffer is saved with the checkpoints; without it a resumed run begins to fill it anew."""
 
 
-Hyperparameters = PpoHyperparameters | SacHyperparameters | DaggerHyperparameters
+Hyperparameters = (
+    PpoHyperparameters
+    | SacHyperparameters
+    | DaggerHyperparameters
+    | BcHyperparameters
+    | Td3BcHyperparameters
+    | IqlHyperparameters
+    | AwacHyperparameters
+)
 HYPERPARAMETERS: Mapping[str, type[Hyperparameters]] = {
     "ppo": PpoHyperparameters,
     "sac": SacHyperparameters,
     "dagger": DaggerHyperparameters,
+    "bc": BcHyperparameters,
+    "td3_bc": Td3BcHyperparameters,
+    "iql": IqlHyperparameters,
+    "awac": AwacHyperparameters,
 }
 
 
@@ -184,8 +205,9 @@ class BehavioralCloning(Block):
 class Behavior(Block):
     """One entry of `behaviors`."""
 
-    trainer_type: Literal["ppo", "sac", "dagger"] = "ppo"
-    """The algorithm; `dagger`, a student beside a teacher, is ours."""
+    trainer_type: Literal["ppo", "sac", "dagger", "bc", "td3_bc", "iql", "awac"] = "ppo"
+    """The algorithm; ours are `dagger`, a student beside a teacher, and `bc`, `td3_bc`, `iql` and `awac`, which learn
+    from the dataset that `offline` names."""
     hyperparameters: Hyperparameters = Field(default_factory=_default_hyperparameters)
     """Numbers of the algorithm."""
     network_settings: NetworkSettings = NetworkSettings()
@@ -194,10 +216,12 @@ class Behavior(Block):
     """What is rewarded; the default is the task's reward alone."""
     behavioral_cloning: BehavioralCloning | None = None
     """Cloning of demonstrations; none: off."""
+    offline: OfflineSettings | None = own_key(None)
+    """The dataset that is learnt from; none: what is collected."""
     self_play: None = None
     """Refused: each environment has one agent."""
     max_steps: Count = 500_000
-    """Training ends after this many decisions of all environments together."""
+    """Training ends after this many decisions of all environments together; offline, after this many gradient steps."""
     time_horizon: Count = 64
     """Decisions after which a trajectory is cut and its rest estimated."""
     summary_freq: Count = 50_000
@@ -229,7 +253,7 @@ class Behavior(Block):
         kind = HYPERPARAMETERS.get(info.data.get("trainer_type", ""))
         if kind is None:  # an unknown trainer is refused under its own key
             return PpoHyperparameters()
-        if isinstance(raw, HyperparametersBase) and not isinstance(raw, kind):
+        if isinstance(raw, GradientHyperparameters) and not isinstance(raw, kind):
             raise ValueError(f"are those of another trainer than {info.data['trainer_type']}")
         return kind.model_validate(raw)
 
@@ -237,6 +261,26 @@ class Behavior(Block):
     def _best_is_reported(self) -> Self:
         if self.keep_best and self.success_target is None:
             raise ValueError("keep_best: takes a success_target, against which policies are held")
+        return self
+
+    @model_validator(mode="after")
+    def _data_are_named(self) -> Self:
+        if isinstance(self.hyperparameters, OfflineHyperparameters) and self.offline is None:
+            raise ValueError(f"offline: is missing: trainer_type {self.trainer_type} learns from a dataset")
+        if isinstance(self.hyperparameters, SacHyperparameters):
+            if self.offline is None and (self.hyperparameters.prefill or self.hyperparameters.hold):
+                raise ValueError("offline: is missing: hyperparameters prefill and hold take its dataset")
+        elif self.offline is not None and not isinstance(self.hyperparameters, OfflineHyperparameters):
+            raise ValueError(f"offline: has no effect with trainer_type {self.trainer_type}")
+        return self
+
+    @model_validator(mode="after")
+    def _only_cloned(self) -> Self:
+        network = self.network_settings
+        has_transformer = network.memory is not None and network.memory.memory_type == "transformer"
+        for is_asked, what in ((network.mixture > 1, "mixture"), (has_transformer, "memory.memory_type transformer")):
+            if is_asked and self.trainer_type != "bc":
+                raise ValueError(f"network_settings: {what}: is for trainer_type bc, not for {self.trainer_type}")
         return self
 
     @model_validator(mode="after")

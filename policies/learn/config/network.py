@@ -1,8 +1,8 @@
 """Networks: `network_settings` of a behaviour and of each reward signal."""
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import field_validator
+from pydantic import field_validator, model_validator
 
 from policies.learn.config.config_block import Block, Count, NotNegativeWhole, own_key
 
@@ -10,12 +10,19 @@ Encoder = Literal["simple", "nature_cnn", "resnet", "match3", "fully_connected",
 
 
 class Memory(Block):
-    """A recurrent policy: one LSTM layer behind the body."""
+    """A policy that remembers: one LSTM layer behind the body, or a transformer over its last features."""
 
     sequence_length: Count = 64
-    """Decisions per sequence that gradients flow through; at most the batch size."""
+    """Decisions per sequence that gradients flow through; at most the batch size. A transformer looks so far back."""
     memory_size: Count = 128
     """Floats of state: half of them hidden, half of them cell."""
+
+    memory_type: Literal["lstm", "transformer"] = own_key("lstm")
+    """What remembers; `transformer`, for `trainer_type: bc`, remembers its inputs, and `memory_size` does not count."""
+    layers: Count = own_key(2)
+    """Of a transformer."""
+    heads: Count = own_key(4)
+    """Of attention, in each layer of a transformer."""
 
     @field_validator("memory_size")
     @classmethod
@@ -44,5 +51,19 @@ class NetworkSettings(Block):
     """Whether `--inference` takes the most probable actions instead of drawing them; training draws."""
     memory: Memory | None = None
     """LSTM; none: feed-forward."""
+    mixture: Count = own_key(1)
+    """Gaussians that continuous actions are a mixture of, for `trainer_type: bc`; the likeliest one acts."""
     perceives: tuple[str, ...] = own_key(())
     """Privileged elements of the task that the policy also says its belief of; learnt beside a teacher."""
+
+    @model_validator(mode="after")
+    def _heads_split_the_width(self) -> Self:
+        memory = self.memory
+        if memory is not None and memory.memory_type == "transformer":
+            if self.hidden_units % memory.heads:
+                raise ValueError(
+                    f"hidden_units: {self.hidden_units} must be a multiple of memory.heads, which is {memory.heads}"
+                )
+            if memory.sequence_length < 2:
+                raise ValueError("memory: sequence_length: a transformer looks at 2 decisions at least")
+        return self

@@ -79,6 +79,10 @@ def _check_demonstrations(loaded: Loaded, task: Task) -> None:
     }
     if behavior.behavioral_cloning is not None:
         paths["behavioral_cloning",] = behavior.behavioral_cloning.demo_path
+    if behavior.offline is not None:
+        with _refused_at(loaded, "behaviors", loaded.config.behavior_name, "offline", "dataset"):
+            for path in behavior.offline.dataset:
+                check_demonstrations(path, task.layout)
     for block, path in paths.items():
         with _refused_at(loaded, "behaviors", loaded.config.behavior_name, *block, "demo_path"):
             check_demonstrations(path, task.layout)

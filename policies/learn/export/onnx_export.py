@@ -17,11 +17,14 @@ import onnx
 import onnxruntime
 import torch
 from numpy.typing import NDArray
-from onnx import TensorProto, helper, numpy_helper
+from onnx import TensorProto, helper
 from torch import Tensor, nn
 
 from common.files import part_path, write_whole
-from policies.learn.networks.action_distributions import CLIP, LOG_SIGMA_LIMITS
+from policies.learn.export.onnx_graph import Graph
+from policies.learn.export.onnx_history import add_history
+from policies.learn.networks.action_distributions import CLIP, LOG_SIGMA_LIMITS, ActionHeads
+from policies.learn.networks.history import History
 from policies.learn.networks.hyper_network import HyperDense
 from policies.learn.networks.networks import Body
 from policies.learn.networks.normalizer import LIMIT
@@ -30,8 +33,6 @@ from policies.learn.networks.policy import Policy
 from policies.learn.networks.vision import Residual
 from policies.tasks.layout import Layout
 
-OPSET = 9
-IR_VERSION = 4  # the one that came with opset 9
 API_VERSION = 3.0  # ML-Agents' number of this set of names
 TOLERANCE = 1e-5
 IMAGE_TOLERANCE = 1e-4  # encoders sum thousands of terms, and in another order
@@ -71,7 +72,7 @@ def export_policy(policy: Policy, path: Path) -> float:
 
 def onnx_bytes(policy: Policy) -> bytes:
     """The policy as an ONNX model."""
-    graph = _Graph()
+    graph = Graph()
     layout = policy.layout
     features = _body(graph, policy.body, layout)
     graph.constant_output("version_number", [API_VERSION])
@@ -87,7 +88,7 @@ def onnx_bytes(policy: Policy) -> bytes:
     return content
 
 
-def _body(graph: "_Graph", body: Body, layout: Layout) -> str:
+def _body(graph: Graph, body: Body, layout: Layout) -> str:
     encoded = ""
     if body.encoder is not None:
         height, width, channels = layout.image_shape
@@ -106,7 +107,9 @@ def _body(graph: "_Graph", body: Body, layout: Layout) -> str:
         features = graph.swish(graph.dense(features, layer))
     if body.hyper is not None:
         features = graph.swish(_hyper(graph, body.hyper, features, goals))
-    if body.recurrence is not None:
+    if isinstance(body.recurrence, History):
+        features = add_history(graph, body.recurrence, features)
+    elif body.recurrence is not None:
         features = _lstm(graph, body.recurrence.lstm, features, body.memory_size)
     return features
 
@@ -116,7 +119,7 @@ def _names(layout: Layout) -> tuple[str, ...]:
     return ("obs_0",) if layout.image is None else ("obs_0", "obs_1")
 
 
-def _encoder(graph: "_Graph", layers: nn.Sequential, images: str) -> str:
+def _encoder(graph: Graph, layers: nn.Sequential, images: str) -> str:
     """Layer by layer; raises TypeError for one that encoders do not have."""
     for layer in layers:
         match layer:
@@ -142,7 +145,7 @@ def _encoder(graph: "_Graph", layers: nn.Sequential, images: str) -> str:
     return images
 
 
-def _hyper(graph: "_Graph", hyper: HyperDense, features: str, goals: str) -> str:
+def _hyper(graph: Graph, hyper: HyperDense, features: str, goals: str) -> str:
     hidden = graph.swish(graph.dense(graph.swish(graph.dense(goals, hyper.first)), hyper.second))
     centred = graph.node("Sub", hidden, graph.node("ReduceMean", hidden, axes=[1], keepdims=1))
     var = graph.node("ReduceMean", graph.node("Mul", centred, centred), axes=[1], keepdims=1)
@@ -154,7 +157,7 @@ def _hyper(graph: "_Graph", hyper: HyperDense, features: str, goals: str) -> str
     return graph.node("Add", graph.node("Squeeze", product, axes=[1]), graph.weight(hyper.bias))
 
 
-def _lstm(graph: "_Graph", lstm: nn.LSTM, features: str, memory_size: int) -> str:
+def _lstm(graph: Graph, lstm: nn.LSTM, features: str, memory_size: int) -> str:
     """One step. ONNX has the gates in the order input, output, forget, cell; torch: input, forget, cell, output."""
     units = lstm.hidden_size
     order = [0, 3, 1, 2]
@@ -173,13 +176,14 @@ def _lstm(graph: "_Graph", lstm: nn.LSTM, features: str, memory_size: int) -> st
     return graph.node("Squeeze", hidden, axes=[0])
 
 
-def _continuous(graph: "_Graph", policy: Policy, features: str) -> None:
+def _continuous(graph: Graph, policy: Policy, features: str) -> None:
     heads, size = policy.heads, len(policy.layout.continuous)
     assert heads.mean is not None  # noqa: S101  (for the type checker)
-    mean = graph.dense(features, heads.mean)
+    mean = _likeliest(graph, heads, features, graph.dense(features, heads.mean))
     if isinstance(heads.log_sigma, nn.Linear):
         low, high = LOG_SIGMA_LIMITS
-        log_sigma = graph.node("Clip", graph.dense(features, heads.log_sigma), min=low, max=high)
+        log_sigma = _likeliest(graph, heads, features, graph.dense(features, heads.log_sigma))
+        log_sigma = graph.node("Clip", log_sigma, min=low, max=high)
         sigma = graph.node("Exp", log_sigma)
     else:
         assert heads.log_sigma is not None  # noqa: S101  (for the type checker)
@@ -195,7 +199,18 @@ def _continuous(graph: "_Graph", policy: Policy, features: str) -> None:
     graph.constant_output("continuous_action_output_shape", [float(size)])
 
 
-def _discrete(graph: "_Graph", policy: Policy, features: str) -> None:
+def _likeliest(graph: Graph, heads: ActionHeads, features: str, outputs: str) -> str:
+    """Of a mixture the outputs of its likeliest component, (batch, continuous); else the outputs themselves."""
+    if heads.mixture is None:
+        return outputs
+    count = heads.component_count
+    best = graph.node("ArgMax", graph.dense(features, heads.mixture), axis=1, keepdims=1)
+    hot = graph.node("OneHot", best, graph.integers([count]), graph.weight(torch.tensor([0.0, 1.0])), axis=2)
+    parts = graph.node("Reshape", outputs, graph.integers([0, count, -1]))
+    return graph.node("Squeeze", graph.node("MatMul", hot, parts), axes=[1])  # (batch, 1, count) x (batch, count, C)
+
+
+def _discrete(graph: Graph, policy: Policy, features: str) -> None:
     sizes = policy.layout.branch_sizes
     assert policy.heads.logits is not None  # noqa: S101  (for the type checker)
     masks = graph.input("action_masks", ["batch", sum(sizes)])  # 1: may be chosen
@@ -208,71 +223,6 @@ def _discrete(graph: "_Graph", policy: Policy, features: str) -> None:
     for name, columns in (("discrete_actions", drawn), ("deterministic_discrete_actions", best)):
         graph.output(name, graph.node("Concat", *columns, axis=1), ["batch", len(sizes)], TensorProto.INT64)
     graph.constant_output("discrete_action_output_shape", [[float(size) for size in sizes]])
-
-
-class _Graph:
-    """An ONNX graph in the making; names are given out in order, so that the same policy gives the same bytes."""
-
-    def __init__(self) -> None:
-        self._nodes: list[Any] = []
-        self._weights: list[Any] = []
-        self._inputs: list[Any] = []
-        self._outputs: list[Any] = []
-
-    def node(self, kind: str, *inputs: str, **attributes: Any) -> str:
-        """Adds an operation with one result, and returns that."""
-        return self.nodes(kind, *inputs, count=1, **attributes)[0]
-
-    def nodes(self, kind: str, *inputs: str, count: int, **attributes: Any) -> list[str]:
-        """Adds an operation, and returns its results."""
-        results = [f"{kind}_{len(self._nodes)}_{k}" for k in range(count)]
-        self._nodes.append(helper.make_node(kind, list(inputs), results, **attributes))
-        return results
-
-    def dense(self, inputs: str, layer: nn.Module) -> str:
-        """A linear layer."""
-        assert isinstance(layer, nn.Linear)  # noqa: S101  (for the type checker)
-        return self.node("Gemm", inputs, self.weight(layer.weight), self.weight(layer.bias), transB=1)
-
-    def convolution(self, images: str, layer: nn.Conv2d) -> str:
-        """A convolution of (batch, channels, height, width)."""
-        sizes = {"kernel_shape": layer.kernel_size, "strides": layer.stride, "pads": [*layer.padding] * 2}
-        assert layer.bias is not None  # noqa: S101  (for the type checker)
-        return self.node("Conv", images, self.weight(layer.weight), self.weight(layer.bias), **sizes)
-
-    def swish(self, inputs: str) -> str:
-        return self.node("Mul", inputs, self.node("Sigmoid", inputs))
-
-    def weight(self, tensor: Tensor) -> str:
-        """Numbers that are part of the graph."""
-        return self._stored(tensor.detach().cpu().numpy())
-
-    def integers(self, values: list[int]) -> str:
-        return self._stored(np.array(values, dtype=np.int64))
-
-    def _stored(self, array: NDArray[Any]) -> str:
-        name = f"weight_{len(self._weights)}"
-        self._weights.append(numpy_helper.from_array(np.ascontiguousarray(array), name))
-        return name
-
-    def input(self, name: str, shape: list[str | int]) -> str:
-        self._inputs.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, shape))
-        return name
-
-    def output(self, name: str, result: str, shape: list[str | int], kind: int = TensorProto.FLOAT) -> None:
-        """Names a result of the graph."""
-        self._nodes.append(helper.make_node("Identity", [result], [name]))
-        self._outputs.append(helper.make_tensor_value_info(name, kind, shape))
-
-    def constant_output(self, name: str, values: Any) -> None:
-        tensor = torch.tensor(values)
-        self.output(name, self.weight(tensor), list(tensor.shape))
-
-    def model(self) -> Any:
-        """The whole."""
-        graph = helper.make_graph(self._nodes, "policy", self._inputs, self._outputs, self._weights)
-        opset = helper.make_opsetid("", OPSET)
-        return helper.make_model(graph, opset_imports=[opset], ir_version=IR_VERSION, producer_name="honeyguide")
 
 
 def largest_difference(policy: Policy, content: bytes, row_count: int = 64, decisions: int = 8) -> float:

@@ -85,25 +85,55 @@ class ActionHeads(nn.Module):
         generator: torch.Generator,
         *,
         is_sigma_learned_by_state: bool = False,
+        components: int = 1,
     ) -> None:
+        """Untrained heads.
+
+        Args:
+            features: that they see.
+            continuous_size: continuous actions.
+            branch_sizes: choices of each branch.
+            generator: draws the weights.
+            is_sigma_learned_by_state: whether the deviation depends on the features.
+            components: Gaussians of a mixture, whose likeliest acts in each row; their deviations depend on features.
+        """
         super().__init__()
         self.branch_sizes = branch_sizes
-        self.mean = dense(features, continuous_size, generator, gain=0.2) if continuous_size else None
+        self.component_count = components if continuous_size else 1
+        outputs = continuous_size * self.component_count
+        self.mean = dense(features, outputs, generator, gain=0.2) if continuous_size else None
         self.log_sigma: nn.Parameter | nn.Linear | None = None
         if continuous_size:
-            by_state = is_sigma_learned_by_state
-            sigma = dense(features, continuous_size, generator, gain=0.2) if by_state else None
+            by_state = is_sigma_learned_by_state or self.component_count > 1
+            sigma = dense(features, outputs, generator, gain=0.2) if by_state else None
             self.log_sigma = sigma or nn.Parameter(torch.zeros(continuous_size))
+        is_mixture = self.component_count > 1
+        self.mixture = dense(features, self.component_count, generator, gain=0.1) if is_mixture else None
+        if is_mixture and self.mean is not None:  # components that began alike would stay alike
+            nn.init.normal_(self.mean.bias, std=0.5, generator=generator)
         self.logits = dense(features, sum(branch_sizes), generator, gain=0.1) if branch_sizes else None
 
     def forward(self, features: Tensor) -> ActionDistribution:
         empty = features[..., :0]
+        if self.mixture is not None:
+            logs, means, log_sigmas = self.components(features)
+            best = logs.argmax(-1)[..., None, None].expand(*means.shape[:-2], 1, means.shape[-1])
+            mean, log_sigma = means.gather(-2, best)[..., 0, :], log_sigmas.gather(-2, best)[..., 0, :]
+            return ActionDistribution(mean, log_sigma, self._choice_logs(features))
         mean = self.mean(features) if self.mean is not None else empty
         if isinstance(self.log_sigma, nn.Linear):
             log_sigma = self.log_sigma(features).clamp(*LOG_SIGMA_LIMITS)
         else:
             log_sigma = empty if self.log_sigma is None else self.log_sigma
         return ActionDistribution(mean, log_sigma, self._choice_logs(features))
+
+    def components(self, features: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """The mixture: log-probabilities (..., components), means and log-deviations (..., components, continuous)."""
+        if self.mixture is None or self.mean is None or not isinstance(self.log_sigma, nn.Linear):
+            raise ValueError("these heads have no mixture")
+        shape = (*features.shape[:-1], self.component_count, -1)
+        log_sigmas = self.log_sigma(features).clamp(*LOG_SIGMA_LIMITS)
+        return self.mixture(features).log_softmax(-1), self.mean(features).view(shape), log_sigmas.view(shape)
 
     @torch.no_grad()
     def sharpen(self, factor: float) -> None:

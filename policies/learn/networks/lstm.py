@@ -15,6 +15,7 @@ class Recurrence(nn.Module):
     def __init__(self, inputs: int, memory_size: int, generator: torch.Generator) -> None:
         super().__init__()
         self.size = memory_size // 2
+        self.memory_size = memory_size
         self.lstm = nn.LSTM(inputs, self.size, device="meta").to_empty(device="cpu")  # no draw from a global generator
         with torch.no_grad():
             for name, parameter in self.lstm.named_parameters():

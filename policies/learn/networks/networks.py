@@ -14,6 +14,7 @@ from torch import Tensor, nn
 
 from policies.learn.config.network import NetworkSettings
 from policies.learn.networks.dense_layers import dense, value_heads
+from policies.learn.networks.history import History
 from policies.learn.networks.hyper_network import HyperDense
 from policies.learn.networks.lstm import Recurrence
 from policies.learn.networks.normalizer import Normalizer
@@ -55,9 +56,8 @@ class Body(nn.Module):
         sizes = [inputs + width * bool(image), *[width] * count]
         self.layers = nn.ModuleList(dense(a, b, generator) for a, b in pairwise(sizes))
         self.hyper = HyperDense(sizes[-1], width, len(self.goal_indices), generator) if self.goal_indices else None
-        memory = settings.memory
-        self.recurrence = Recurrence(width, memory.memory_size, generator) if memory else None
-        self.memory_size = memory.memory_size if memory else 0
+        self.recurrence = _recurrence(width, settings, generator)
+        self.memory_size = self.recurrence.memory_size if self.recurrence else 0
         self.size = self.recurrence.size if self.recurrence else width
 
     def normalize(self, observations: Tensor | Observation) -> None:
@@ -75,9 +75,14 @@ class Body(nn.Module):
             if observation.image is None:
                 raise ValueError("this network sees an image, and was given none")
             features = torch.cat((self.encoder(observation.image), features), dim=-1)
+        features = self.hidden(features)
+        return features if self.hyper is None else F.silu(self.hyper(features, goals))
+
+    def hidden(self, features: Tensor) -> Tensor:
+        """What the dense layers make of normalised floats, behind the image's features, shape (..., hidden units)."""
         for layer in self.layers:
             features = F.silu(layer(features))
-        return features if self.hyper is None else F.silu(self.hyper(features, goals))
+        return features
 
     def step(self, observations: Tensor | Observation, memory: Tensor) -> tuple[Tensor, Tensor]:
         """Features (rows, size) and the memory after them (rows, memory); no columns without memory."""
@@ -100,6 +105,15 @@ class Body(nn.Module):
         if observation.privileged is None:
             raise ValueError("this network sees privileged elements, and was given none")
         return torch.cat((observation.vector, observation.privileged), dim=-1)
+
+
+def _recurrence(width: int, settings: NetworkSettings, generator: torch.Generator) -> Recurrence | History | None:
+    memory = settings.memory
+    if memory is None:
+        return None
+    if memory.memory_type == "transformer":
+        return History(width, memory.sequence_length, memory.layers, memory.heads, generator)
+    return Recurrence(width, memory.memory_size, generator)
 
 
 def policy_body(layout: Layout, settings: NetworkSettings, generator: torch.Generator) -> Body:

@@ -36,6 +36,13 @@ class Normalizer(nn.Module):
         self.mean += apart * (added / total)
         self.count.copy_(total)
 
+    @torch.no_grad()
+    def take(self, mean: Tensor, variance: Tensor, count: int) -> None:
+        """Takes the statistics of so many vectors, shapes (size,), in place of all that was seen before."""
+        self.count.copy_(torch.tensor(count + 1))
+        self.mean.copy_(mean)
+        self.squares.copy_(variance * count + 1.0)
+
     @property
     def deviation(self) -> Tensor:
         """Shape (size,), float32."""

@@ -37,6 +37,7 @@ class Policy(nn.Module):
             layout.branch_sizes,
             generator,
             is_sigma_learned_by_state=is_squashed,
+            components=settings.mixture,
         )
         self.perception = (
             Perception(self.body.size, layout, settings.perceives, generator) if settings.perceives else None

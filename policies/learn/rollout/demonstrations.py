@@ -39,7 +39,7 @@ def load_demonstrations(demo_path: str, layout: Layout) -> Transitions:
         DemonstrationError: nothing there, no episode in it, or not readable.
         LayoutError: recorded with another task or preset.
     """
-    datasets = [_read_dataset(folder, layout) for folder in _data_folders(demo_path)]
+    datasets = [_read_dataset(folder, layout) for folder in data_folders(demo_path)]
     episodes = [episode for dataset in datasets for episode in dataset]
     if not episodes:
         raise DemonstrationError(f"{demo_path}: has no episodes")
@@ -54,12 +54,16 @@ def check_demonstrations(demo_path: str, layout: Layout) -> None:
         DemonstrationError: nothing there, or not readable.
         LayoutError: recorded with another task or preset.
     """
-    for folder in _data_folders(demo_path):
-        layout.require(_recorded_layout(folder), str(folder))
+    for folder in data_folders(demo_path):
+        layout.require(recorded_layout(folder), str(folder))
 
 
-def _data_folders(demo_path: str) -> list[Path]:
-    """The folders with a metadata.json that a path means."""
+def data_folders(demo_path: str) -> list[Path]:
+    """The folders with a metadata.json that a path means.
+
+    Raises:
+        DemonstrationError: there is none.
+    """
     path = Path(demo_path)
     if path.is_file():
         path = path.parent
@@ -77,8 +81,12 @@ def _data_folders(demo_path: str) -> list[Path]:
 _Episode = tuple[NDArray[Any], ...]
 
 
-def _recorded_layout(folder: Path) -> Layout:
-    """The layout that a dataset was recorded with."""
+def recorded_layout(folder: Path) -> Layout:
+    """The layout that a dataset was recorded with.
+
+    Raises:
+        DemonstrationError: its metadata cannot be read, or is not ours.
+    """
     try:
         record = json.loads((folder / _METADATA_FILE).read_text(encoding="utf-8")).get(LAYOUT_KEY)
         recorded = Layout.from_record(json.loads(record)) if record else None
@@ -95,7 +103,7 @@ def _read_dataset(folder: Path, layout: Layout) -> list[_Episode]:
     """The episodes of one dataset as columns in the order of `Transitions`."""
     from minari.dataset.minari_storage import MinariStorage  # noqa: PLC0415  (only who has demonstrations pays for it)
 
-    layout.require(_recorded_layout(folder), str(folder))
+    layout.require(recorded_layout(folder), str(folder))
     try:
         storage = MinariStorage.read(folder)
         count = int(storage.total_episodes)

@@ -174,4 +174,6 @@ def test_every_key_with_a_value_is_written_out_in_ml_agents_form():
     ]
     car = written["behaviors"]["Car"]
     assert car["hyperparameters"]["beta_schedule"] == "linear"
-    assert set(Behavior.model_fields) - set(car) == {"behavioral_cloning", "self_play", "init_path", "success_target"}
+    assert set(Behavior.model_fields) - set(car) == {
+        *("behavioral_cloning", "offline", "self_play", "init_path", "success_target"),
+    }

@@ -114,7 +114,10 @@ def refused(folder, text, *args, **kwargs):
             MASS + "    curriculum:\n    - name: a\n      valu: 1\n",
             "9: environment_parameters.mass.curriculum[0].value: is required",
         ),
-        ("behaviors:\n  Car:\n    trainer_type: poca\n", "3: @.trainer_type: must be ppo, sac or dagger, not 'poca'"),
+        (
+            "behaviors:\n  Car:\n    trainer_type: poca\n",
+            "3: @.trainer_type: must be ppo, sac, dagger, bc, td3_bc, iql or awac, not 'poca'",
+        ),
         ("behaviors:\n  Car:\n    hyperparameters: {}\n", "3: @.trainer_type: is required"),
         ("behaviors: {}\n", "1: behaviors: there is no behaviour to train"),
         ("behaviors: 7\n", "1: behaviors: must be a mapping of keys to values, not 7"),

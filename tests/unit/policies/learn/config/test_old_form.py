@@ -119,7 +119,7 @@ def test_an_unknown_flat_key_is_warned_about(tmp_path):
         (FLAT.replace("trainer: ppo", "summary: 1"), "21: Car.trainer: is required"),
         (
             FLAT.replace("trainer: ppo", "trainer: offline_bc"),
-            "2: @trainer_type: must be ppo, sac or dagger, not 'offline_bc'",
+            "2: @trainer_type: must be ppo, sac, dagger, bc, td3_bc, iql or awac, not 'offline_bc'",
         ),
         (FLAT.replace("beta: 5.0e-3", "beta: -1"), "4: @hyperparameters.beta: must be at least 0, not -1"),
         (FLAT.replace("num_layers: 2", "num_layers: two"), "14: @network_settings.num_layers: must be a whole number"),
