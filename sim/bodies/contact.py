@@ -27,6 +27,7 @@ Vec12: TypeAlias = Any if TYPE_CHECKING else wp.types.vector(length=4 + MAX_MOTO
 _OBSTACLE_MARGIN_M = wp.constant(0.2)  # an obstacle nearer than this is found before the substeps reach it: 50 m/s
 _NEAR_FACTOR = wp.constant(1.5)  # steep ground is nearer than the height above it: good to 48 deg
 _NOWHERE_M = wp.constant(1.0e6)
+_DECK_DEEP_M = wp.constant(0.06)  # a foot as deep below another vehicle's top swings in from its side; guess
 _FRICTION = wp.constant(0.7)  # JSBSim F450 Gear.xml: 0.8 static, 0.5 dynamic
 _NORMAL_RATE_RAD_S = 90.0  # guess: legs yield 1.2 mm under the weight; stable and damped at 1 ms
 _TANGENT_RATE_RAD_S = 120.0  # guess: as stiff as 1 ms steps allow
@@ -161,7 +162,8 @@ def look_at_deck(world: World, model: ContactModel, around: Surroundings, r_ned_
         if around.is_near_solid == 0:
             around.leg_offset_m[point] = -_NOWHERE_M
         end_ned = around.origin_ned + r_ned_from_frd * contact_point_frd(model, point)
-        if offset_m > around.leg_offset_m[point] and is_over_deck(one, tick, end_ned):
+        is_from_above = offset_m + end_ned[2] - around.origin_ned[2] < _DECK_DEEP_M
+        if is_from_above and offset_m > around.leg_offset_m[point] and is_over_deck(one, tick, end_ned):
             around.leg_normal_x[point] = 0.0
             around.leg_normal_y[point] = 0.0
             around.leg_normal_z[point] = -1.0

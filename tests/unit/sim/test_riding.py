@@ -83,6 +83,13 @@ def test_who_stands_over_the_edge_falls_off(carried):
     assert -met.truth(STANDING)["pos_ned"][2] < met.top_m
 
 
+def test_feet_that_are_below_the_top_already_are_not_flung_up(carried):
+    met = carried()
+    met.put(STANDING, (5.0, 0.0, -met.top_m - 0.15))
+    met.drive(0.0, 0.02)
+    assert met.truth(STANDING)["vel_ned"][2] > -0.1
+
+
 def test_the_carrier_drives_on_as_without_a_load():
     """Left out, and said so: it feels nothing of who stands on it."""
     alone, laden = Met(("x500", "ugv"), apart_m=5.0), Carried()
