@@ -33,6 +33,7 @@ SCRIPTS = {
     "hover": "bench.learning.hover",
     "environments": "bench.learning.environments",
     "training": "bench.learning.training",
+    "roofline": "bench.learning.roofline",
     "sac": "bench.learning.sac",
     "offline": "bench.learning.offline",
     "companion": "bench.learning.companion",
