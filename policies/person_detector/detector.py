@@ -87,6 +87,7 @@ class PersonDetector:
     """
 
     def __init__(self, network: DetectorNetwork | None = None, least: float = 0.2) -> None:
+        torch.set_num_threads(1)  # one small image: more threads only wait for each other
         self._network = (network or shipped()).eval()
         self._least = log(least / (1.0 - least))
 
@@ -98,7 +99,7 @@ class PersonDetector:
             down_frd: the first two elements of the unit vector down in the body frame: how the vehicle leans.
         """
         with torch.inference_mode():
-            logits, log_ranges, _ = self._network(torch.from_numpy(pixels)[None])
+            logits, log_ranges, _ = self._network(torch.tensor(pixels)[None])
         scores = logits[0].numpy()
         ranges = log_ranges[0].exp().numpy()
         found = []
