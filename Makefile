@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test-missions fly mission park train-demo reproduce-cars test test-all test-bare test-hostile test-mavproxy test-ardupilot test-px4 test-betaflight test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow reproduce-drive reproduce-navigate reproduce-navigate-rover
+.PHONY: help setup test-missions fly mission park train-demo reproduce-cars test test-all test-bare test-hostile test-mavproxy test-ardupilot test-px4 test-betaflight test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow reproduce-drive reproduce-navigate reproduce-navigate-rover reproduce-offline
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -52,6 +52,9 @@ reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in three l
 reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policy from nothing, and judge it (a quarter of an hour)
 	@$(BIN)/honeyguide train navigate-rover --run-id navigate-rover --force
 	@$(BIN)/python -m bench.navigate_rover results/navigate-rover/NavigateRover.pt
+
+reproduce-offline: $(STAMP) ## Log flights, learn from their logs alone, forecast, then fly; flags: ARGS="--clumsy 60 --shipped 30"
+	@$(BIN)/python -m bench.offline_story $(ARGS)
 
 reproduce-drive: $(STAMP) ## Train and judge the policies of docs/results/drive.md (half an hour); only judge: ARGS="judge"
 	@$(BIN)/python -m bench.drive $(ARGS)

@@ -1,0 +1,108 @@
+"""Fitted Q evaluation: what a policy would return, learnt from decisions of others (Le, Voloshin and Yue 2019).
+
+In: a store and a policy that has no memory. Out: its mean discounted return from where the recorded episodes began,
+with an interval. Several networks learn from the same decisions; they and the episodes are drawn anew for the interval
+(bootstrap). Nothing is simulated. Where the policy does what was never recorded, it is a guess, and `away` says how far
+off that is.
+"""
+
+import copy
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from policies.learn.networks.policy import Policy
+from policies.offline.flat_parameters import FlatOptimizer, flatten
+from policies.offline.stacked_networks import StackedNetworks
+from policies.offline.store import OfflineStore
+
+MEMBERS = 5
+_TAU, _RATE, _BATCH, _ROWS = 0.01, 1.0e-3, 512, 8192
+_DRAWS = 1000  # of the bootstrap
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Of the mean discounted return of an episode."""
+
+    mean: float
+    low: float  # 95 %
+    high: float
+    away: float  # [1] root mean square of what the policy's actions differ from the recorded ones, in action ranges
+
+
+class FittedQ:
+    """Values of a policy, learnt from recorded decisions.
+
+    Args:
+        store: what was recorded, of continuous actions.
+        policy: what is judged, without memory; its most probable actions count.
+        gamma: discount of the rewards.
+        seed: of all draws.
+        hidden: units of each of two layers.
+
+    Raises:
+        ValueError: a policy with memory, images or choices.
+    """
+
+    def __init__(self, store: OfflineStore, policy: Policy, gamma: float, *, seed: int = 0, hidden: int = 128) -> None:
+        if policy.memory_size or policy.layout.image is not None or policy.layout.branches:
+            raise ValueError("fitted Q evaluation is for policies of continuous actions without memory or images")
+        self._store, self._gamma = store, gamma
+        self._generator = torch.Generator().manual_seed(seed)
+        statistics = store.statistics()
+        self._mean, self._scale = statistics.mean.float(), (statistics.variance.float() + 1e-6).rsqrt()
+        size = store.layout.observation_size + len(store.layout.continuous)
+        self._networks = StackedNetworks(MEMBERS, [size, hidden, hidden, 1], self._generator)
+        self._targets = copy.deepcopy(self._networks).requires_grad_(False)
+        self._target_vector = flatten(self._targets.parameters())
+        self._optimizer = FlatOptimizer(self._networks.parameters(), _RATE)
+        self._actions = _actions_of(policy, store)
+        self._unit = max(statistics.reward_deviation, 1e-6) / (1.0 - gamma)  # of values: they are learnt as about 1
+        rewards = store.rewards[store.decisions]
+        self._bounds = float(rewards.min()) / (1.0 - gamma), float(rewards.max()) / (1.0 - gamma)
+
+    def fit(self, steps: int) -> None:
+        """So many gradient steps."""
+        low, high = (bound / self._unit for bound in self._bounds)
+        for _ in range(steps):
+            drawn = torch.randint(len(self._store), (_BATCH,), generator=self._generator)
+            rows = self._store.decisions[drawn]
+            batch = self._store.take(rows)
+            with torch.no_grad():
+                next_values = self._targets(self._inputs(batch.next_observations, self._actions[rows + 1]))[..., 0]
+                goes_on = 1.0 - batch.is_terminated
+                wanted = batch.rewards / self._unit + self._gamma * goes_on * next_values.clamp(low, high)
+            values = self._networks(self._inputs(batch.observations, batch.continuous))[..., 0]
+            self._optimizer.step((values - wanted).square().mean(dim=1).sum())
+            self._target_vector.lerp_(self._optimizer.vector.detach(), _TAU)
+
+    @torch.no_grad()
+    def estimate(self) -> Estimate:
+        """From the first decisions of all episodes."""
+        first = self._store.starts
+        inputs = self._inputs(self._store.observations[first], self._actions[first])
+        values = self._unit * self._targets(inputs)[..., 0]  # (members, episodes)
+        draws = []
+        for _ in range(_DRAWS):
+            members = torch.randint(MEMBERS, (MEMBERS,), generator=self._generator)
+            episodes = torch.randint(len(first), (len(first),), generator=self._generator)
+            draws.append(values[members][:, episodes].mean())
+        low, high = torch.stack(draws).quantile(torch.tensor([0.025, 0.975])).tolist()
+        decisions = self._store.decisions
+        apart = self._actions[decisions] - self._store.continuous[decisions]
+        return Estimate(float(values.mean()), low, high, float(apart.square().mean().sqrt()))
+
+    def _inputs(self, observations: Tensor, actions: Tensor) -> Tensor:
+        return torch.cat([((observations - self._mean) * self._scale).clamp(-10.0, 10.0), actions], dim=-1)
+
+
+@torch.no_grad()
+def _actions_of(policy: Policy, store: OfflineStore) -> Tensor:
+    """The policy's most probable action in every row of a store, shape (rows, actions)."""
+    chosen = []
+    for part in store.observations.split(_ROWS):
+        actions, _ = policy.act(part.contiguous(), policy.start_memory(len(part)))
+        chosen.append(policy.bounded(actions))
+    return torch.cat(chosen)
