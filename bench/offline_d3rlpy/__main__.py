@@ -9,6 +9,7 @@ docs/results/offline-d3rlpy.jsonl already is not measured again, unless it is of
 import json
 import subprocess
 import time
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -47,22 +48,17 @@ def main(
     """Collects, trains, judges, and writes the rows and their section of docs/results/offline.md."""
     torch.set_num_threads(1)
     console = Console(highlight=False)
-    for name in case or CASES:
-        if name not in CASES:
-            raise typer.BadParameter(f"no case {name}; there are {', '.join(CASES)}", param_hint="--case")
-        for trainer in TRAINERS:
-            for quality in QUALITIES:
-                sizes = {"steps": steps, "hidden": hidden, "episodes": episodes}
-                key = {"case": name, "quality": quality, "trainer": trainer}
-                rows = _rows()
-                if any(row.items() >= (key | sizes).items() for row in rows):
-                    continue
-                row = (
-                    key | sizes | _measured(CASES[name], trainer, quality, folder / name, sizes, d3rlpy_python, console)
-                )
-                kept = [other for other in rows if not other.items() >= key.items()]
-                write_whole(RESULTS, "".join(f"{json.dumps(each)}\n" for each in [*kept, row]).encode())
-                console.print(row)
+    if unknown := [name for name in case or () if name not in CASES]:
+        raise typer.BadParameter(f"no case {unknown[0]}; there are {', '.join(CASES)}", param_hint="--case")
+    sizes = {"steps": steps, "hidden": hidden, "episodes": episodes}
+    for name, trainer, quality in product(case or CASES, TRAINERS, QUALITIES):
+        key = {"case": name, "quality": quality, "trainer": trainer}
+        if any(row.items() >= (key | sizes).items() for row in _rows()):
+            continue
+        row = key | sizes | _measured(CASES[name], trainer, quality, folder / name, sizes, d3rlpy_python, console)
+        kept = [other for other in _rows() if not other.items() >= key.items()]
+        write_whole(RESULTS, "".join(f"{json.dumps(each)}\n" for each in [*kept, row]).encode())
+        console.print(row)
     write_section(_rows())
 
 
