@@ -29,10 +29,10 @@ def write_section(rows: list[dict[str, Any]]) -> None:
         "```",
         "",
         f"d3rlpy {version} and we learn from the same datasets (`bench/offline_d3rlpy/cases.py`; d3rlpy from their",
-        f"D4RL export), {steps:,} gradient steps of 256 decisions, 2 layers of {hidden}, swish, discount 0.99, Adam",
-        "at 3e-4, one thread, one seed. Scores are 0 at random actions and 100 at the pilot without noise. Times are the",
-        f"processor's, of the gradient steps alone, in the same run: d3rlpy takes {spans} as long.",
-        f"Our score is at least d3rlpy's in {wins} of {len(rows)} rows.",
+        f"D4RL export): {steps:,} gradient steps of 256 decisions, 2 layers of {hidden}, swish, discount 0.99, Adam at",
+        "3e-4, one thread, one seed. Scores are 0 at random actions and 100 at the pilot without noise. Times are",
+        "of the processor, for the gradient steps alone, in one run; d3rlpy takes as long as ours",
+        f"{spans}. Our score is at least d3rlpy's in {wins} of {len(rows)} rows.",
         "",
         "| dataset | learnt by | its score | ours | d3rlpy | time, d3rlpy / ours |",
         "|---|---|---|---|---|---|",
@@ -45,11 +45,12 @@ def write_section(rows: list[dict[str, Any]]) -> None:
         )
     lines += [
         "",
-        "What differs: d3rlpy leaves out the last decision of an episode that was cut, since it does not keep what was",
-        "seen after it; its initial weights and its order of minibatches are other draws; its observations are normalised",
-        "beforehand, which we do in each step. Policies of both are played by our simulator on the same episodes; that",
-        "they are d3rlpy's is checked by their actions. Parking1's actions are choices, which TD3+BC has not, and d3rlpy's",
-        "IQL neither; Drive's parking stands for it. Rows: [offline-d3rlpy.jsonl](offline-d3rlpy.jsonl).",
+        "What differs: d3rlpy leaves out the last decision of an episode that was cut, since it does not keep what",
+        "was seen after it; its initial weights and its order of minibatches are other draws; its observations are",
+        "normalised beforehand, which we do in each step. Policies of both are played by our simulator, on the same",
+        "episodes; that they are d3rlpy's is checked by their actions. Parking1's actions are choices, which TD3+BC",
+        "has not, and d3rlpy's IQL neither; Drive's parking stands for it. Rows:",
+        "[offline-d3rlpy.jsonl](offline-d3rlpy.jsonl).",
         "",
     ]
     write_whole(PAGE, with_section(PAGE.read_text(encoding="utf-8"), HEADING, "\n".join(lines)).encode())
