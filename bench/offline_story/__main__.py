@@ -47,8 +47,8 @@ def main(
     _log(folder, {"clumsy": clumsy, "shipped": shipped}, jobs, console)
     _build(folder)
     _train(folder, steps)
-    forecast = _forecast(folder)
-    chosen = max(forecast["policies"], key=lambda name: forecast["policies"][name]["estimate"])
+    forecast = _forecast(folder, jobs)
+    chosen = max(forecast["policies"], key=lambda name: forecast["policies"][name]["mean"])
     console.print(f"forecast: {chosen}")
     flown = _fly(folder, chosen, flights, jobs)
     write_page(
@@ -108,7 +108,7 @@ def _recipe(folder: Path, trainer: str, hyperparameters: dict[str, Any], steps: 
     }
 
 
-def _forecast(folder: Path) -> dict[str, Any]:
+def _forecast(folder: Path, jobs: int) -> dict[str, Any]:
     """What each policy is said to return before it has flown, by fitted Q evaluation on the logs."""
     from bench.offline_story.forecast import forecast
 
@@ -116,7 +116,7 @@ def _forecast(folder: Path) -> dict[str, Any]:
     if not path.exists():
         policies = {name: folder / "runs" / name / "FollowMe.pt" for name in TRAINERS}
         datasets = [folder / "datasets" / name for name in PILOTS]
-        write_whole(path, json.dumps(forecast(datasets, policies), indent=1).encode())
+        write_whole(path, json.dumps(forecast(datasets, policies, jobs), indent=1).encode())
     return dict(json.loads(path.read_text(encoding="utf-8")))
 
 

@@ -27,7 +27,7 @@ def write_page(
         "| learnt by | forecast, discounted | 95 % | off the recorded actions |",
         "|---|---|---|---|",
     ]
-    for name, found in sorted(forecast["policies"].items(), key=lambda item: -item[1]["estimate"]):
+    for name, found in sorted(forecast["policies"].items(), key=lambda item: -item[1]["mean"]):
         mark = " (flown)" if name == chosen else ""
         interval = f"{found['low']:.2f} to {found['high']:.2f}"
         lines.append(f"| {name}{mark} | {found['estimate']:.2f} | {interval} | {found['away']:.3f} |")

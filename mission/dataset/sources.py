@@ -20,7 +20,7 @@ from mission.log.motion_topics import STEERING_TOPIC
 from mission.log.replay_topic import OWNER, REPLAY_TOPIC
 from mission.log.ulog_file import UlogDamage, read_topics
 from mission.simulator.flight_rig import flight_world
-from mission.view.replay_file import ATTITUDE, CONFIG_KEY, PLACE, info_text
+from mission.view.replay_file import ATTITUDE, CONFIG_KEY, PLACE, config_of, info_text
 from policies.companion.decision_log import LAYOUT_KEY, PILOT_KEY, TOPIC
 from policies.datasets.decisions import DecisionRows, TruthRows
 from policies.datasets.episodes import DatasetError
@@ -120,7 +120,7 @@ def read_flight(path: Path, *, by_truth: bool = True) -> FlightSource:
         raise DatasetError(f"{path}: has no topic {TOPIC}: it was not flown with --record")
     try:
         layout = Layout.from_record(json.loads(info_text(log, LAYOUT_KEY)))
-        config = FlightConfig.model_validate_json(info_text(log, CONFIG_KEY)) if CONFIG_KEY in infos else None
+        config = config_of(info_text(log, CONFIG_KEY), path.parent) if CONFIG_KEY in infos else None
         arrays = {name: vector(columns, name) for name in ("frame", "action", "flown", "pos_ned", "vel_ned", "goal")}
         for name in ("yaw", "i_image", "is_flying", "is_first"):
             arrays[name] = columns[name]

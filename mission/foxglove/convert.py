@@ -23,7 +23,7 @@ from mission.foxglove.ulog_states import UlogStates
 from mission.foxglove.vehicle_state import VehicleState
 from mission.log.ulog_file import UlogDamage, read_topics
 from mission.simulator.flight_rig import flight_world
-from mission.view.replay_file import CONFIG_KEY, PATH_KEY, info_text
+from mission.view.replay_file import CONFIG_KEY, PATH_KEY, config_of, info_text
 from sim.world.world import WorldMap
 
 TOPICS = (
@@ -48,7 +48,7 @@ def convert(log: Path, target: Path) -> int:
     """
     try:
         ulog = read_topics(log, TOPICS)
-        config = _config(ulog)
+        config = _config(ulog, log.parent)
         states = UlogStates(ulog, DEFAULT_HOME if config is None else config.home)
         if not states.times():
             raise ConversionError(f"{log}: holds no attitude and no position")
@@ -105,10 +105,10 @@ def _write_scene(
         publisher.channels.log(PLAN, plan_scene(path_ned, now_us), now_us)
 
 
-def _config(ulog: ULog) -> FlightConfig | None:
+def _config(ulog: ULog, folder: Path) -> FlightConfig | None:
     """What the flight was made from; None: the log does not say it, or says it in the words of another version."""
     try:
-        config = FlightConfig.model_validate(json.loads(info_text(ulog, CONFIG_KEY)))
+        config = config_of(info_text(ulog, CONFIG_KEY), folder)
         load_airframe(config.airframe)
     except (KeyError, IndexError, ValueError, ValidationError, AirframeError):
         return None

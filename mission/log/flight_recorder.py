@@ -146,6 +146,11 @@ class Recorder:
             log.add(STEERING_TOPIC, {})
         return log
 
+    @property
+    def folder(self) -> Path | None:
+        """Of the run; none is kept."""
+        return None if self._path is None else self._path.parent
+
     def keep_for_replay(self, take: Callable[[Rows], None], info: Mapping[str, Sequence[str]]) -> None:
         """The log, if there is one, shall also hold what a replay shows; before the first frame.
 

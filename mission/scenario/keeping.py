@@ -12,6 +12,7 @@ from mission.console.option_checks import UserError
 from mission.scenario.runner import RESULT_FILE
 from mission.scenario.scenario import Scenario
 from mission.scenario.scenario_file import SUFFIX
+from mission.world.world_copies import keep_world_file
 
 
 def run_folder_of(keep: Path, scenario: Scenario, seed: int) -> Path:
@@ -37,9 +38,11 @@ def emptied(folder: Path) -> Path:
 
 
 def keep_scenario(folder: Path, scenario: Scenario, seed: int) -> str:
-    """Writes the scenario of one run beside its logs, with its plans; the command that flies it again."""
+    """Writes the scenario of one run beside its logs, with its plans and its world; the command that flies it again."""
     given = scenario.model_copy(update={"seeds": (seed,)}).model_dump(mode="json", by_alias=True, exclude_unset=True)
     _copy_plans(given, folder)
+    if scenario.world.file is not None:
+        given["world"]["file"] = keep_world_file(scenario.world.file, folder)
     path = folder / f"{scenario.name}{SUFFIX}"
     write_whole(path, yaml.safe_dump(given, sort_keys=False, default_flow_style=None, allow_unicode=True).encode())
     return f"honeyguide test {shlex.quote(str(path))}"

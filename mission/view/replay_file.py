@@ -6,6 +6,7 @@ vehicle disarmed for long there is a moment each second (`mission.log.kept_frame
 
 import json
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from math import nan
@@ -24,6 +25,8 @@ from mission.log.motion_topics import STEERING_TOPIC
 from mission.log.replay_topic import OWNER, REPLAY_TOPIC
 from mission.log.ulog_file import UlogDamage, read_topics
 from mission.view.flight_snapshot import MOMENT, Moment, Row, mode_titles
+from mission.world.world_copies import with_copies
+from sim.world.custom.world_file import WorldFile
 
 CONFIG_KEY, PATH_KEY = "replay_config", "replay_path"  # of the log's information
 TEXT_MAX = 60_000  # [byte] of one piece of information
@@ -91,8 +94,30 @@ def keep_for_replay(
             row["owner"] = owner.people.numpy()[0]
 
     path = np.array(path_ned, np.float32).reshape(-1, 3).tolist()
-    info = {CONFIG_KEY: flight.config.model_dump_json(), PATH_KEY: json.dumps(path)}
+    info = {CONFIG_KEY: json.dumps(_kept_config(flight)), PATH_KEY: json.dumps(path)}
     flight.recorder.keep_for_replay(take, {key: _pieces(text) for key, text in info.items()})
+
+
+def _kept_config(flight: FlightBase) -> dict[str, Any]:
+    """What the flight is made from; files of its world are copied beside its log."""
+    given, folder = flight.config.model_dump(mode="json"), flight.recorder.folder
+    if folder is not None and isinstance(flight.config.world, WorldFile):
+        with suppress(OSError):  # a full disk: it is shown as long as the files are where they were
+            given["world"] = with_copies(given["world"], folder)
+    return given
+
+
+def config_of(text: str, folder: Path) -> FlightConfig:
+    """What a flight was made from.
+
+    Args:
+        text: of CONFIG_KEY.
+        folder: of its log, beside which the files of its world lie.
+
+    Raises:
+        ValueError: damaged, or of another version.
+    """
+    return FlightConfig.model_validate(json.loads(text), context={"folder": folder})
 
 
 def _pieces(text: str) -> list[str]:
@@ -130,7 +155,7 @@ def _load_one(folder: Path) -> Recording:
             f"{parts[-1]}: is no log of this version's honeyguide fly or follow: show it with the version that wrote it"
         )
     try:
-        config = FlightConfig.model_validate(json.loads(info_text(logs[-1], CONFIG_KEY)))
+        config = config_of(info_text(logs[-1], CONFIG_KEY), folder)
         path_ned = np.array(json.loads(info_text(logs[-1], PATH_KEY)), np.float32).reshape(-1, 3)
         rows = np.concatenate([_rows(log) for log in logs])
     except (KeyError, ValueError) as error:

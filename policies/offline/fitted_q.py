@@ -102,7 +102,7 @@ class FittedQ:
 def _actions_of(policy: Policy, store: OfflineStore) -> Tensor:
     """The policy's most probable action in every row of a store, shape (rows, actions)."""
     chosen = []
-    for part in store.observations.split(_ROWS):
+    for part in torch.split(store.observations, _ROWS):
         actions, _ = policy.act(part.contiguous(), policy.start_memory(len(part)))
         chosen.append(policy.bounded(actions))
     return torch.cat(chosen)

@@ -28,6 +28,7 @@ NOT_RUN_HERE = {
     "make reproduce-cars": "hours of training; docs/results/cars.md is what it writes",
     "make reproduce-navigate": "half an hour of training; docs/results/navigate.md is what it writes",
     "make reproduce-follow": "hours of training; docs/results/follow.md is what it writes",
+    "make reproduce-offline": "half an hour of flights and training; docs/results/offline.md is what it writes",
     "make train-demo": "minutes of training; tests/unit/mission/train runs its commands",
     'make tune ARGS="--airframe common/airframes/f450.toml"': "tests/unit/autopilot/test_tuning.py",
     ".venv/bin/python -m autopilot.estimator.derive": "tests/unit/autopilot/estimator/test_derive.py",
