@@ -1,4 +1,6 @@
-"""`python -m bench.offline_story.batch POLICY…`: policies on owners who walk and who run, in batch, held-out worlds.
+"""`python -m bench.offline_story.batch SPLIT POLICY…`: policies on owners who walk and who run, in batch.
+
+SPLIT is `train`, where a policy may be chosen, or `test`: worlds that nothing was chosen in.
 
 What flies over MAVLink has a guard and another simulation of camera and phone; in batch a policy is alone. This shows
 how far the two are apart, and how the policies of a story stand beside each other, whatever was forecast.
@@ -22,11 +24,11 @@ CELLS = {"walk": Cell(100.0, 2.0), "run": Cell(100.0, 5.0)}
 EPISODES = 32  # of each condition
 
 
-def judged(policies: dict[str, Path]) -> dict[str, dict[str, Any]]:
+def judged(policies: dict[str, Path], split: str) -> dict[str, dict[str, Any]]:
     """Of each policy and condition: time in the band with its interval, collisions, mean reward of an episode."""
     torch.set_num_threads(1)
     settings = FollowSettings.model_validate(
-        {"observation": "tracked", "owner": "any", "split": "test", "terrain": "fresh", "stack": 3}
+        {"observation": "tracked", "owner": "any", "split": split, "terrain": "fresh", "stack": 3}
     )
     task = FollowMe(settings, EPISODES)
     found: dict[str, dict[str, Any]] = {}
@@ -45,9 +47,9 @@ def judged(policies: dict[str, Path]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def main(*paths: str) -> None:
+def main(split: str, *paths: str) -> None:
     """Prints a line of each policy and condition."""
-    for name, conditions in judged({path: Path(path) for path in paths}).items():
+    for name, conditions in judged({path: Path(path) for path in paths}, split).items():
         for condition, found in conditions.items():
             value, low, high = (100.0 * share for share in found["in_band"])
             ends = f"collisions {100.0 * found['collision']:.0f} %, return {found['mean_return']:.1f}"
