@@ -16,8 +16,8 @@ def write_section(rows: list[dict[str, Any]]) -> None:
     """Writes it, in place of the one that is there."""
     version, steps, hidden = rows[0]["d3rlpy"], rows[0]["steps"], rows[0]["hidden"]
     ratios = {name: [row["d3rlpy_cpu_s"] / row["cpu_s"] for row in rows if row["trainer"] == name] for name in _NAMES}
-    spans = "; ".join(
-        f"{_NAMES[name]} {min(found):.1f} to {max(found):.1f} times" for name, found in ratios.items() if found
+    spans = " and ".join(
+        f"{min(found):.1f} to {max(found):.1f} times for {_NAMES[name]}" for name, found in ratios.items() if found
     )
     wins = sum(row["score"] >= row["d3rlpy_score"] for row in rows)
     lines = [
@@ -31,7 +31,7 @@ def write_section(rows: list[dict[str, Any]]) -> None:
         f"d3rlpy {version} and we learn from the same datasets (`bench/offline_d3rlpy/cases.py`; d3rlpy from their",
         f"D4RL export): {steps:,} gradient steps of 256 decisions, 2 layers of {hidden}, swish, discount 0.99, Adam at",
         "3e-4, one thread, one seed. Scores are 0 at random actions and 100 at the pilot without noise. Times are",
-        "of the processor, for the gradient steps alone, in one run; d3rlpy takes as long as ours",
+        "of the processor, for the gradient steps alone, in one run; d3rlpy takes longer than we do,",
         f"{spans}. Our score is at least d3rlpy's in {wins} of {len(rows)} rows.",
         "",
         "| dataset | learnt by | its score | ours | d3rlpy | time, d3rlpy / ours |",
