@@ -62,7 +62,7 @@ class FittedQ:
         drawn = torch.randint(store.episode_count, (MEMBERS, store.episode_count), generator=self._generator)
         counts = torch.stack([torch.bincount(each, minlength=store.episode_count) for each in drawn]).float()
         self._counts = torch.repeat_interleave(counts, store.lengths, dim=1)  # (members, decisions)
-        self._unit = max(statistics.reward_deviation, 1e-6) / (1.0 - gamma)  # of values: they are learnt as about 1
+        self._unit = max(_return_size(store, gamma), statistics.reward_deviation, 1e-6)  # values are learnt as about 1
         rewards = store.rewards[store.decisions]
         self._bounds = float(rewards.min()) / (1.0 - gamma), float(rewards.max()) / (1.0 - gamma)
 
@@ -103,6 +103,15 @@ class FittedQ:
 
     def _inputs(self, observations: Tensor, actions: Tensor) -> Tensor:
         return torch.cat([((observations - self._mean) * self._scale).clamp(-10.0, 10.0), actions], dim=-1)
+
+
+def _return_size(store: OfflineStore, gamma: float) -> float:
+    """The root mean square of the discounted returns of the recorded episodes."""
+    episodes = torch.repeat_interleave(torch.arange(store.episode_count), store.lengths)
+    passed = (store.decisions - store.starts[episodes]).double()
+    paid = store.rewards[store.decisions].double() * gamma**passed
+    returns = torch.zeros(store.episode_count, dtype=torch.float64).index_add_(0, episodes, paid)
+    return float(returns.square().mean().sqrt())
 
 
 @torch.no_grad()
