@@ -29,9 +29,7 @@ def write_page(content: dict[str, Any], rows: list[dict[str, Any]], summary: dic
     for row in rows:
         found = " | ".join(f"{row[key][0]:.3f} ({row[key][1]:.3f} to {row[key][2]:.3f})" for key in ESTIMATES)
         truth = f"{row['truth']:.3f} ± {row['truth_half']:.3f}"
-        lines.append(
-            f"| {row['policy']} | {truth} | {found} | {row['effective']:.0f} | {100 * row['outside']:.0f} % |"
-        )
+        lines.append(f"| {row['policy']} | {truth} | {found} | {row['effective']:.0f} | {100 * row['outside']:.0f} % |")
     section = "\n".join((HEADING, "", *lines, "", "![Estimates and truth](images/offline-estimates.png)", ""))
     write_whole(PAGE, with_section(PAGE.read_text(encoding="utf-8"), HEADING, section).encode())
     _draw(rows)

@@ -213,7 +213,12 @@ def task_names() -> list[str]:
 
 def is_task_name(name: str) -> bool:
     """Whether it names a task, and not a policy: one of `task_names`, `gym:ID`, `model:PATH` or `module:Class`."""
-    return name in CATALOGUE or name.startswith((GYM, MODEL)) or bool(_MODULE_CLASS.fullmatch(name)) or name in task_names()
+    return (
+        name in CATALOGUE
+        or name.startswith((GYM, MODEL))
+        or bool(_MODULE_CLASS.fullmatch(name))
+        or name in task_names()
+    )
 
 
 def runs_code(name: str) -> bool:
