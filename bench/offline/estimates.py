@@ -135,7 +135,7 @@ def _policies(folder: Path) -> dict[str, Policy]:
         with torch.no_grad():
             for weights in policy.parameters():
                 if weights.dim() > 1:
-                    weights += noise * weights.std() * torch.randn(weights.shape, generator=generator)
+                    weights.add_(torch.randn(weights.shape, generator=generator), alpha=noise * float(weights.std()))
         policies[f"shipped, noise {noise:g}"] = policy
     return policies
 

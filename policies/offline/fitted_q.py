@@ -2,8 +2,8 @@
 
 In: a store and a policy that has no memory. Out: its mean discounted return from where the recorded episodes began,
 with an interval. Each of several networks learns from episodes of its own, drawn anew of the recorded ones (bootstrap);
-how much they differ and how much the beginnings differ make the interval. Nothing is simulated. Where the policy does what was never recorded, it is a guess, and `away` says how far
-off that is.
+how much they differ and how much the beginnings differ make the interval. Nothing is simulated. Where the policy does
+what was never recorded, it is a guess, and `away` says how far off that is.
 """
 
 import copy
@@ -68,7 +68,7 @@ class FittedQ:
 
     def fit(self, steps: int) -> None:
         """So many gradient steps."""
-        low, high = (bound / self._unit for bound in self._bounds)
+        low, high = self._bounds[0] / self._unit - 1.0, self._bounds[1] / self._unit + 1.0  # room: else noise is bias
         for _ in range(steps):
             drawn = torch.randint(len(self._store), (_BATCH,), generator=self._generator)
             rows = self._store.decisions[drawn]

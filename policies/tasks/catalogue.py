@@ -1,8 +1,8 @@
 """Tasks by name: what `honeyguide train NAME` and `gymnasium.make("honeyguide/NAME-v0")` build.
 
 A name is one of the catalogue below, one that an installed package has given in its entry points `honeyguide.tasks`,
-`module:Class` of a task of one's own, `gym:ID` of any Gymnasium environment, or `model:PATH` of a model learnt from logs. Light to import: a task's kernels are
-imported when it is asked for.
+`module:Class` of a task of one's own, `gym:ID` of any Gymnasium environment, or `model:PATH` of a model learnt from
+logs. Light to import: a task's kernels are imported when it is asked for.
 """
 
 import re

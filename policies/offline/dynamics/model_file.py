@@ -97,7 +97,7 @@ def load_model(path: Path) -> DynamicsModel:
         raise ModelError(f"{path}: no such file") from None
     except ModelError:
         raise
-    except Exception as error:  # noqa: BLE001  (torch and pickle raise anything of a file that is none)
+    except Exception as error:  # torch and pickle raise anything of a file that is none
         raise ModelError(f"{path}: is no model: {type(error).__name__}") from None
     bounds = content["reward_bounds"]
     return DynamicsModel(

@@ -1,7 +1,7 @@
 """A policy judged on recorded decisions alone: three estimates of its return, and where it leaves the data.
 
-In: a store and policies without memory. Out: verdicts. The judged policy is a Gaussian of a stated width around its most
-probable action where weights are needed, for a deterministic one would never take a recorded action again; fitted Q
+In: a store and policies without memory. Out: verdicts. Where weights are needed, the judged policy is a Gaussian of a
+stated width around its most probable action, for a deterministic one would never take a recorded action again; fitted Q
 evaluation judges the most probable action itself.
 """
 
@@ -24,7 +24,7 @@ from policies.offline.evaluation.weighted_returns import (
 from policies.offline.fitted_q import FittedQ
 from policies.offline.store import OfflineStore
 
-CLIP = 100.0  # of the weights, and its inverse (guess: a hundredth of the usual data may count as one episode)
+CLIP = 1000.0  # of the weights (guess)
 WIDTH = 0.2  # of the judged policy's Gaussian, of actions in -1 to 1
 SUPPORT = 0.99  # fraction of the recorded actions that is called the data's support
 _OWN_ACTIONS = 4  # drawn of the judged policy at each observation, for what it is worth there

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from common.intervals import Interval
 
+_LEAST = -60.0  # log of a weight: where all episodes are unlikely, sums stay above zero
 DRAWS = 1000  # of the bootstrap (Efron and Tibshirani 1993, ch. 13)
 Floats = NDArray[np.float64]
 
@@ -27,14 +28,8 @@ class PaddedEpisodes:
     values: Floats  # what the judged policy's own action is said to be worth
 
     def weights(self, clip: float) -> Floats:
-        """The products of the ratios up to each decision, none above `clip` nor below its inverse."""
-        limit = np.log(clip)
-        sums = np.zeros(len(self.log_ratios))
-        weights = np.empty_like(self.log_ratios)
-        for k in range(self.log_ratios.shape[1]):
-            sums = np.clip(sums + self.log_ratios[:, k], -limit, limit)
-            weights[:, k] = np.exp(sums)
-        return weights
+        """The products of the ratios up to each decision, none above `clip`."""
+        return np.exp(np.clip(np.cumsum(self.log_ratios, axis=1), _LEAST, np.log(clip)))
 
 
 def importance_weighted(episodes: PaddedEpisodes, gamma: float, clip: float, seed: int = 0) -> Interval:
