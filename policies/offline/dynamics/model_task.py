@@ -1,7 +1,7 @@
 """A task that is a model learnt from logs: `model:PATH`. Where no simulator fits, policies are trained in it.
 
 One decision: a member of the ensemble, drawn for every row anew, says what comes (Chua et al. 2018, TS1), its Gaussian
-is drawn from. Where the members disagree more than they may, the episode ends and pays the least that was recorded for
+is drawn from; the reward is its mean. Where the members disagree more than they may, the episode ends and pays the least that was recorded for
 all that would have followed (Kidambi et al. 2020, MOReL, has the same pessimism).
 """
 
@@ -90,7 +90,11 @@ class ModelTask(Task):
         scaled = found.mean[members, rows] + noise * found.log_deviation[members, rows].exp()
         change = scaled * networks.scales["target_deviation"] + networks.scales["target_mean"]
         shown = seen + change[:, :-1]
-        rewards = change[:, -1].clamp(*self.model.reward_bounds)
+        # Without its noise, which the bounds would make a gain of where little is paid.
+        paid = (
+            found.mean[members, rows, -1] * networks.scales["target_deviation"][-1] + networks.scales["target_mean"][-1]
+        )
+        rewards = paid.clamp(*self.model.reward_bounds)
         is_ended = torch.rand(len(seen), generator=generator) < found.end_logit[members, rows].sigmoid()
         is_lost = (networks.disagreement(found) > self.model.limit) | ~shown.isfinite().all(dim=1)
         shown = torch.where(shown.isfinite(), shown, seen)
