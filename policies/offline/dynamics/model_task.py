@@ -1,8 +1,8 @@
 """A task that is a model learnt from logs: `model:PATH`. Where no simulator fits, policies are trained in it.
 
-One decision: a member of the ensemble, drawn for every row anew, says what comes (Chua et al. 2018, TS1), its Gaussian
-is drawn from; the reward is its mean. Where the members disagree more than they may, the episode ends and pays the least that was recorded for
-all that would have followed (Kidambi et al. 2020, MOReL, has the same pessimism).
+One decision: a member of the ensemble, drawn for every row anew, says what comes (Chua et al. 2018, TS1): its Gaussian
+is drawn from, and the reward is its mean. Where the members disagree more than they may, the episode ends and pays the
+negative of the greatest recorded reward, times `lost_penalty` (after Kidambi et al. 2020, MOReL).
 """
 
 from collections.abc import Sequence
