@@ -1,4 +1,4 @@
-"""The commands of `honeyguide dataset`: build, collect, show, merge, split, filter, export."""
+"""The commands of `honeyguide dataset`: build, collect, show, judge, model, merge, split, filter, export."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -104,6 +104,54 @@ def show(
         from mission.dataset.show import show_dataset
 
         show_dataset(dataset, Console(), picture=picture, film=mp4, episode=episode)
+
+
+@app.command()
+def judge(
+    datasets: Annotated[list[Path], typer.Argument(help="Datasets of one task and layout.")],
+    policy: Annotated[list[str], typer.Option(help="A policy: a file, a run or a name. Repeatable.")],
+    gamma: Annotated[
+        float | None, typer.Option(min=0.0, max=0.9999, help="Discount; left out: that of the task's recipe.")
+    ] = None,
+    width: Annotated[float, typer.Option(min=0.01, max=2.0, help="Of the Gaussian around a policy's actions.")] = 0.2,
+    clip: Annotated[float, typer.Option(min=1.0, help="Of importance weights, from above.")] = 1000.0,
+    steps: Annotated[int, typer.Option(min=1, help="Gradient steps of fitted Q evaluation.")] = 3000,
+    picture: Annotated[Path | None, typer.Option(help="Write where policies leave the data as a PNG.")] = None,
+    json_file: Annotated[Path | None, typer.Option("--json", help="Write the figures as JSON.")] = None,
+    seed: _Seed = 0,
+) -> None:
+    """Judge policies without flying: returns from recorded decisions, with intervals."""
+    with _refusing():
+        with loading(Console()):
+            from mission.dataset.judge import JudgeOptions, judge_policies
+
+        files = picture, json_file
+        options = JudgeOptions(tuple(datasets), tuple(policy), gamma, width, clip, steps, seed, *files)
+        judge_policies(options, Console())
+
+
+@app.command()
+def model(
+    datasets: Annotated[list[Path], typer.Argument(help="Datasets of one task and layout.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="The file to make, which `train` takes as model:FILE.")
+    ],
+    steps: Annotated[int, typer.Option(min=1, help="Gradient steps at most.")] = 20_000,
+    hidden: Annotated[int, typer.Option(min=1, max=4096, help="Units of each of two layers.")] = 128,
+    seed: _Seed = 0,
+) -> None:
+    """Learn a model of a task's dynamics, to train in where no simulator fits."""
+    with _refusing():
+        with loading(Console()):
+            from policies.datasets.episodes import DatasetError
+            from policies.learn.rollout.demonstrations import DemonstrationError
+            from policies.offline.dynamics.model_file import ModelError, fit_and_save
+
+        try:
+            made = fit_and_save([str(path) for path in datasets], output, steps=steps, seed=seed, hidden=hidden)
+        except (DemonstrationError, ModelError) as error:
+            raise DatasetError(str(error)) from error
+        typer.echo(f"{output}: explains {100 * (1 - made.networks.held_out):.1f} % of held-out variance")
 
 
 @app.command()
