@@ -30,7 +30,7 @@ def write_page(
     for name, found in sorted(forecast["policies"].items(), key=lambda item: -item[1]["mean"]):
         mark = " (flown)" if name == chosen else ""
         interval = f"{found['low']:.2f} to {found['high']:.2f}"
-        lines.append(f"| {name}{mark} | {found['estimate']:.2f} | {interval} | {found['away']:.3f} |")
+        lines.append(f"| {name}{mark} | {found['mean']:.2f} | {interval} | {found['away']:.3f} |")
     lines += [
         "",
         "| flown over MAVLink | condition | flights | within 1 to 3 m | no collision |",

@@ -40,7 +40,7 @@ PLACES = {
     "bench": ("bench",),
     "mutants": ("tests/mutants",),
 }
-OWN_ENVIRONMENTS = ("tests/mavproxy", "tests/mavsdk3", "tests/dronekit")
+OWN_ENVIRONMENTS = ("tests/mavproxy", "tests/mavsdk3", "tests/dronekit", "bench/offline_d3rlpy/theirs.py")
 # Distributions whose module has another name.
 NAMED_OTHERWISE = {
     "cosmic_ray": "cosmic-ray",

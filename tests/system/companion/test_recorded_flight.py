@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import torch
 from rich.console import Console
 from typer.testing import CliRunner
 
@@ -15,9 +16,12 @@ from mission.follow.lockstep import flight_with_companion, follow_for
 from policies.companion.skills.load_skill import load_follower
 from policies.datasets.episodes import DatasetError
 from policies.datasets.reader import DatasetReader
+from policies.learn.export.policy_file import load_policy
+from policies.offline.store import open_store
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
 SECONDS = 4.0
+TRACKED = ("observation=tracked", "has_estimator=false", "owner=any", "terrain=kept")
 
 
 class Witness:
@@ -127,3 +131,31 @@ def test_commands_show_and_filter_it(tracked, tmp_path):
     refused = run.invoke(app, ["dataset", "filter", str(one), "-o", str(tmp_path / "x"), "--outcome", "lost"])
     assert refused.exit_code == 2
     assert json.loads((one / "metadata.json").read_text())["honeyguide_task"] == "FollowMe"
+
+
+def test_a_policy_is_cloned_from_its_log(tracked, tmp_path):
+    folder, _ = tracked
+    dataset = built(folder, tmp_path / "set", env_args=(*TRACKED, "stack=3"))
+    recipe = {
+        "behaviors": {
+            "FollowMe": {
+                "trainer_type": "bc",
+                "offline": {"dataset": str(dataset), "evaluation_episodes": 0},
+                "network_settings": {"normalize": True, "hidden_units": 16, "num_layers": 1},
+                "max_steps": 400,
+            }
+        },
+        "env_settings": {"env_path": "FollowMe", "env_args": [*TRACKED, "stack=3"], "num_areas": 1},
+    }
+    (tmp_path / "bc.yaml").write_text(json.dumps(recipe))
+    words = ["train", str(tmp_path / "bc.yaml"), "--run-id", "bc", "--results-dir", str(tmp_path), "--seed", "1"]
+    trained = CliRunner().invoke(app, words)
+    assert trained.exit_code == 0, trained.output
+    policy, card = load_policy(tmp_path / "bc" / "FollowMe.pt")
+    assert card.task == "FollowMe"
+    store = open_store([str(dataset)], policy.layout)
+    with torch.no_grad():
+        actions, _ = policy.act(store.observations[store.decisions].contiguous(), policy.start_memory(len(store)))
+        apart = (policy.bounded(actions) - store.continuous[store.decisions]).abs().mean()
+    recorded = store.continuous[store.decisions]
+    assert apart < 0.5 * (recorded - recorded.mean(dim=0)).abs().mean()  # nearer than the mean action is

@@ -1,0 +1,1 @@
+"""Our offline training beside d3rlpy's, on the same datasets."""

@@ -1,0 +1,147 @@
+"""`python -m bench.offline_d3rlpy --d3rlpy-python PATH`: our IQL and TD3+BC beside d3rlpy's, like for like.
+
+Both learn from the same datasets, ours from its folder, d3rlpy from its D4RL export, the same networks (2 layers,
+swish) with the same batches, discount, rates and steps, on one thread. Each policy then plays the same episodes in our
+batch simulator. d3rlpy is in an environment of its own (`pip install torch d3rlpy h5py`). A row that is in
+docs/results/offline-d3rlpy.jsonl already is not measured again, unless it is of other sizes.
+"""
+
+import json
+import subprocess
+import time
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import torch
+import typer
+from rich.console import Console
+
+from bench.learning.offline import built
+from bench.offline_d3rlpy.cases import CASES, QUALITIES, Case, collected
+from bench.offline_d3rlpy.page import RESULTS, write_section
+from bench.row import require
+from common.files import write_whole
+from policies.datasets.exporting import export_d4rl
+from policies.learn.evaluate import evaluate
+from policies.learn.networks.normalizer import LIMIT
+from policies.learn.networks.policy import Policy
+from policies.offline.draws import Draws
+from policies.offline.scores import normalized_score
+from policies.offline.store import OfflineStore, open_store
+from policies.tasks.catalogue import settings_of
+
+TRAINERS = ("iql", "td3_bc")
+BATCH, GAMMA, BLOCK = 256, 0.99, 200
+EVALUATION_SEED = 11
+
+
+def main(
+    d3rlpy_python: Annotated[Path, typer.Option(help="Python of the environment that has d3rlpy.", exists=True)],
+    case: Annotated[list[str] | None, typer.Option(help=f"Of {', '.join(CASES)}; all. Repeatable.")] = None,
+    steps: Annotated[int, typer.Option(min=200, help="Gradient steps of each training.")] = 5_000,
+    hidden: Annotated[int, typer.Option(min=1, help="Units of each of two layers.")] = 64,
+    episodes: Annotated[int, typer.Option(min=1, help="Judged episodes of each policy.")] = 100,
+    folder: Annotated[Path, typer.Option(help="Where datasets lie.")] = Path("results/offline-d3rlpy"),
+) -> None:
+    """Collects, trains, judges, and writes the rows and their section of docs/results/offline.md."""
+    torch.set_num_threads(1)
+    console = Console(highlight=False)
+    if unknown := [name for name in case or () if name not in CASES]:
+        raise typer.BadParameter(f"no case {unknown[0]}; there are {', '.join(CASES)}", param_hint="--case")
+    sizes = {"steps": steps, "hidden": hidden, "episodes": episodes}
+    for name, trainer, quality in product(case or CASES, TRAINERS, QUALITIES):
+        key = {"case": name, "quality": quality, "trainer": trainer}
+        if any(row.items() >= (key | sizes).items() for row in _rows()):
+            continue
+        row = key | sizes | _measured(CASES[name], trainer, quality, folder / name, sizes, d3rlpy_python, console)
+        kept = [other for other in _rows() if not other.items() >= key.items()]
+        write_whole(RESULTS, "".join(f"{json.dumps(each)}\n" for each in [*kept, row]).encode())
+        console.print(row)
+    write_section(_rows())
+
+
+def _rows() -> list[dict[str, Any]]:
+    return [json.loads(line) for line in RESULTS.read_text(encoding="utf-8").splitlines()] if RESULTS.exists() else []
+
+
+def _measured(
+    case: Case, trainer: str, quality: str, folder: Path, sizes: dict[str, int], python: Path, console: Console
+) -> dict[str, Any]:
+    """Scores and times of both."""
+    folder.mkdir(parents=True, exist_ok=True)
+    dataset = collected(case, quality, folder, console)
+    references = [_mean_return(collected(case, each, folder, console)) for each in ("random", "best")]
+    store = open_store([str(dataset)])
+    ours, our_s = _ours(trainer, store, sizes)
+    theirs, their_s, notes = _theirs(trainer, store, dataset, sizes, python)
+    settings = settings_of(case.task, case.env_args)
+    returns = [
+        evaluate(policy, case.task, settings, episodes=sizes["episodes"], seed=EVALUATION_SEED).mean_return
+        for policy in (ours, theirs)
+    ]
+    scores = [normalized_score(value, references) for value in (*returns, _mean_return(dataset))]
+    return {
+        "decisions": len(store),
+        **notes,
+        "score": round(scores[0], 2),
+        "d3rlpy_score": round(scores[1], 2),
+        "dataset_score": round(scores[2], 2),
+        "cpu_s": round(our_s, 2),
+        "d3rlpy_cpu_s": round(their_s, 2),
+        "references": [round(value, 3) for value in references],
+    }
+
+
+def _mean_return(dataset: Path) -> float:
+    return float(open_store([str(dataset)]).episode_returns().mean())
+
+
+def _ours(trainer: str, store: OfflineStore, sizes: dict[str, int]) -> tuple[Policy, float]:
+    policy, algorithm = built(trainer, store, sizes["hidden"])
+    draws, generator = Draws(store, BATCH, 1, 1.0), torch.Generator().manual_seed(0)
+    start_s = time.process_time()
+    for first in range(0, sizes["steps"], BLOCK):
+        for rows in draws.block(min(BLOCK, sizes["steps"] - first), generator):
+            algorithm.step(rows)
+    return policy, time.process_time() - start_s
+
+
+def _theirs(
+    trainer: str, store: OfflineStore, dataset: Path, sizes: dict[str, int], python: Path
+) -> tuple[Policy, float, dict[str, Any]]:
+    """d3rlpy's policy as one of ours, weight by weight."""
+    policy, _ = built("bc", store, sizes["hidden"])
+    normalizer = policy.body.normalizer
+    assert normalizer is not None
+    assert policy.heads.mean is not None
+    exported = dataset.with_suffix(".hdf5")
+    if not exported.exists():
+        export_d4rl(dataset, exported)
+    job, out = dataset.with_suffix(".json"), dataset.with_suffix(".npz").absolute()
+    record = {
+        "trainer": trainer, "dataset": str(exported.absolute()), "out": str(out), "steps": sizes["steps"],
+        "hidden": sizes["hidden"], "batch": BATCH, "gamma": GAMMA, "seed": 0, "limit": LIMIT,
+        "mean": normalizer.mean.tolist(), "deviation": normalizer.deviation.tolist(),
+    }  # fmt: skip
+    write_whole(job, json.dumps(record).encode())
+    words = [str(python), str(Path(__file__).with_name("theirs.py").absolute()), str(job.absolute())]
+    subprocess.run(words, check=True, stdout=subprocess.DEVNULL, cwd=dataset.parent)
+    with np.load(out) as arrays:
+        weights = [torch.from_numpy(arrays[name]) for name in sorted(arrays.files) if name.startswith("w")]
+        spent_s, actions = float(arrays["spent_s"]), arrays["actions"]
+        notes = {"d3rlpy_decisions": int(arrays["decisions"]), "d3rlpy": str(arrays["version"])}
+    layers = [*policy.body.layers, policy.heads.mean]
+    parameters = [parameter for layer in layers for parameter in layer.parameters()]
+    with torch.no_grad():
+        for there, here in zip(parameters, weights, strict=True):
+            there.copy_(here)
+        chosen, _ = policy.act(store.observations[: len(actions)].contiguous(), policy.start_memory(len(actions)))
+    apart = np.abs(policy.bounded(chosen).numpy() - actions).max()
+    require(apart < 1e-4, f"{dataset}: {trainer}: the policy that is played is {apart:.2g} off d3rlpy's")
+    return policy, spent_s, notes
+
+
+if __name__ == "__main__":
+    typer.run(main)
