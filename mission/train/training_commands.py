@@ -52,6 +52,9 @@ def train(
     ] = False,
     results_dir: Annotated[str | None, typer.Option(help="Folder of all runs. Default: results.")] = None,
     torch_device: Annotated[str | None, typer.Option(help="Where networks are computed: cpu, cuda.")] = None,
+    processes: Annotated[
+        int | None, typer.Option(min=1, max=64, help="Processes that train together, by an offline algorithm.")
+    ] = None,
     keep_checkpoints: Annotated[int | None, typer.Option(help="How many of the newest checkpoints stay.")] = None,
     save_freq: Annotated[int | None, typer.Option(help="Steps between checkpoints.")] = None,
     curriculum: Annotated[str | None, typer.Option(help="A curriculum file of ML-Agents 0.15.")] = None,
