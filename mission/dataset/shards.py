@@ -1,7 +1,7 @@
 """Episodes of the batch simulator collected in shards, each with a seed of its own, by whoever has time.
 
-In: what is to be collected. Out: one dataset, the same bytes whoever collected which shard, in whichever order, and however
-often it was interrupted. Finished shards lie in `NAME.shards` beside the dataset until all are there; each is written
+In: what is to be collected. Out: one dataset, the same bytes whoever collected which shard, in whichever order, and
+however often it was interrupted. Finished shards lie in `NAME.shards` beside the dataset until all are there; each is written
 whole or not at all, and none is collected twice.
 """
 
@@ -121,8 +121,8 @@ def _open(folder: Path, whole: ShardOrder, count: int) -> None:
             for key, value in told.items():
                 if there.get(key) != value:
                     raise DatasetError(
-                        f"{folder}: holds shards of another collection: {key} is {there.get(key)} there, and here {value}; "
-                        "remove it to begin anew"
+                        f"{folder}: holds shards of another collection: {key} is {there.get(key)} there, "
+                        f"and here {value}; remove it to begin anew"
                     )
         else:
             write_whole(file, json.dumps(told, indent=2).encode())

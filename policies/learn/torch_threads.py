@@ -11,7 +11,9 @@ import torch
 def few_threads(*, has_images: bool = False, processes: int = 1) -> Iterator[None]:
     """Half the cores that this process may use, ML-Agents' rule, or all for networks of images; at most 4 either way.
 
-    Processes that train together share the cores. More only get in each other's way in small networks; convolutions share their work well.
+    Processes that train together share the cores.
+
+    More only get in each other's way in small networks; convolutions share their work well.
     """
     cores = len(os.sched_getaffinity(0))
     before = torch.get_num_threads()

@@ -4,13 +4,13 @@ import os
 import signal
 import subprocess
 import sys
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from common.clock import wall_sleep_s
 from tests.documents import ROOT
+from tests.system.datasets.killing import children, processes_with
 
 MOST_S = 240.0
 RAY_HEAD = "127.0.0.1:6398"
@@ -26,27 +26,6 @@ def command(out, *more, episodes=600):
 
 def content(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-
-def processes_with(*words):
-    """Process numbers whose command line has all these words."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        with suppress(OSError):
-            line = (entry / "cmdline").read_bytes().decode(errors="replace") if entry.name.isdigit() else ""
-            if line and all(word in line for word in words):
-                found.append(int(entry.name))
-    return found
-
-
-def children(pid):
-    """Process numbers of what a process started by multiprocessing."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        with suppress(OSError):
-            if entry.name.isdigit() and f"\nPPid:\t{pid}\n" in (entry / "status").read_text():
-                found.append(int(entry.name))
-    return [pid for pid in found if pid in processes_with("spawn_main")]
 
 
 def finished(out):
@@ -83,9 +62,10 @@ def test_a_killed_process_and_a_killed_collection_change_nothing(tmp_path, undis
         wall_sleep_s(0.02)
     else:
         pytest.fail("processes outlive the collection")
-    done = subprocess.run(command(out, "--jobs", "2"), cwd=ROOT, capture_output=True, text=True, timeout=MOST_S)
-    assert done.returncode == 0, done.stderr
-    assert "600 episodes" in done.stdout
+    process = subprocess.Popen(command(out, "--jobs", "2"), cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    output, _ = process.communicate(timeout=MOST_S)
+    assert process.returncode == 0, output
+    assert "600 episodes" in output
     assert content(out) == undisturbed
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 

@@ -1,4 +1,4 @@
-"""Offline training by several processes: what one process does on the same minibatches, and what a killed one leaves."""
+"""Offline training by several processes: what one does on the same minibatches, and what a killed one leaves."""
 
 import multiprocessing
 import os
