@@ -1,8 +1,8 @@
 """Episodes of the batch simulator collected in shards, each with a seed of its own, by whoever has time.
 
 In: what is to be collected. Out: one dataset, the same bytes whoever collected which shard, in whichever order, and
-however often it was interrupted. Finished shards lie in `NAME.shards` beside the dataset until all are there; each is written
-whole or not at all, and none is collected twice.
+however often it was interrupted. Finished shards lie in `NAME.shards` beside the dataset until all are there; each is
+written whole or not at all, and none is collected twice.
 """
 
 import hashlib

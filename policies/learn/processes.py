@@ -79,7 +79,7 @@ def together(config: RunConfig, learner: Learner) -> Iterator[None]:
         yield
         return
     os.environ.setdefault("GLOO_SOCKET_IFNAME", "lo")
-    store = distributed.TCPStore(HOST, 0, is_master=True, wait_for_workers=False, timeout=timedelta(seconds=START_S))
+    store = _store(0, is_master=True)
     processes = [_started(config, store.port, k) for k in range(1, count)]
     try:
         _wait_until_ready(processes)
@@ -114,20 +114,27 @@ def _started(config: RunConfig, port: int, number: int) -> tuple[BaseProcess, "C
 
 def _wait_until_ready(processes: list[tuple[BaseProcess, "Connection[Any, Any]"]]) -> None:
     """Raises RuntimeError if one ends before."""
-    left = {connection for _, connection in processes}
+    left: set[Any] = {connection for _, connection in processes}
     while left:
-        ready = wait(list(left), START_S)
+        ready: list[Any] = wait(list(left), START_S)
         if not ready:
             raise RuntimeError(f"processes that are to train together have not begun within {START_S:g} s")
         for connection in ready:
             try:
-                connection.recv()  # type: ignore[union-attr]
+                connection.recv()
             except EOFError:
                 raise RuntimeError("a process has ended before it began to train") from None
-            left.discard(connection)  # type: ignore[arg-type]
+            left.discard(connection)
 
 
-def _join(store: distributed.Store, number: int, count: int) -> None:
+def _store(port: int, *, is_master: bool) -> Any:
+    """Where processes find each other; port 0 takes a free one."""
+    wait_s = timedelta(seconds=START_S)
+    make: Any = distributed.TCPStore  # type: ignore[attr-defined]
+    return make(HOST, port, is_master=is_master, wait_for_workers=False, timeout=wait_s)
+
+
+def _join(store: Any, number: int, count: int) -> None:
     distributed.init_process_group(
         "gloo", store=store, rank=number, world_size=count, timeout=timedelta(seconds=ROUND_S)
     )
@@ -155,7 +162,7 @@ def _take_part(config: RunConfig, port: int, number: int, connection: "Connectio
     count = config.torch_settings.processes
     learner = _learner(config)
     try:
-        store = distributed.TCPStore(HOST, port, is_master=False, timeout=timedelta(seconds=START_S))
+        store = _store(port, is_master=False)
         connection.send("ready")
         _join(store, number, count)
         state: list[Any] = [None]
