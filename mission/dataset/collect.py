@@ -2,41 +2,17 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from mission.console.terminal import print_line
 from mission.dataset.shards import Collectors, ShardOrder, collect_shards, shard_orders
-from mission.train.play import PlayError, PlayOptions, cast
-from policies.datasets.collecting import NoisyDriver, collected
-from policies.datasets.episodes import DatasetError, DatasetOrigin
+from mission.dataset.write_episodes import EXPERT, RANDOM, CollectOptions, write_episodes
+from mission.train.play import PlayError
 from policies.datasets.reader import DatasetReader
-from policies.datasets.writer import DatasetWriter
 from policies.experts.demonstration_file import check_is_free
-from policies.experts.episode_recording import MAX_ROWS
 from policies.learn.export.policy_path import CheckpointError, find_policy
-from policies.tasks.catalogue import settings_of
-
-EXPERT, RANDOM = "expert", "random"
-
-
-@dataclass(frozen=True, slots=True)
-class CollectOptions:
-    """What the command is given."""
-
-    task: str
-    policy: str
-    episodes: int
-    out: Path
-    noise: float = 0.0
-    seed: int = 0
-    env_args: tuple[str, ...] = ()
-    shards: int | None = None
-    jobs: int | None = None
-    ray: str | None = None
 
 
 def collect_dataset(options: CollectOptions, console: Console) -> None:
@@ -58,35 +34,6 @@ def collect_dataset(options: CollectOptions, console: Console) -> None:
     with DatasetReader(options.out) as reader:
         words = f"{reader.count} episodes, {reader.successes} of them successful, {reader.steps} decisions"
     print_line(console, f"{options.out}: {words}")
-
-
-def write_episodes(options: CollectOptions, note: Callable[[int], None] = lambda _: None) -> None:
-    """Collects and writes in one go.
-
-    Raises:
-        See `collect_dataset`.
-    """
-    is_named = options.policy not in (EXPERT, RANDOM)
-    played = PlayOptions(
-        options.task,
-        options.episodes,
-        min(options.episodes, MAX_ROWS),
-        options.seed,
-        options.env_args,
-        options.policy if is_named else None,
-        options.policy == RANDOM,
-        options.policy == EXPERT,
-        None,
-    )
-    task, driver, name = cast(played)
-    if task.layout.image is not None:
-        raise DatasetError(f"{task.layout.task}: shows images as it is set, and datasets of episodes hold none")
-    settings = getattr(task, "settings", None) or settings_of(options.task, options.env_args)
-    pilot = (Path(name).stem if is_named else options.policy) + (f"-noise-{options.noise:g}" if options.noise else "")
-    origin = DatasetOrigin(task.layout, settings.model_dump(mode="json"), pilot, options.seed)
-    noisy = NoisyDriver(driver, options.noise, options.seed)
-    with DatasetWriter(options.out, origin) as writer:
-        writer.add_all(collected(task, noisy, options.episodes, options.seed, note))
 
 
 def _collect_shards(options: CollectOptions, count: int, note: Callable[[int], None]) -> None:

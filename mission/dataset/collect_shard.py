@@ -4,6 +4,8 @@ import tempfile
 from pathlib import Path
 
 from mission.dataset.shards import ShardOrder, files_of, place
+from mission.dataset.write_episodes import CollectOptions, write_episodes
+from policies.learn.torch_threads import use_one_thread
 
 
 def collect_shard(order: ShardOrder) -> dict[str, bytes]:
@@ -12,11 +14,7 @@ def collect_shard(order: ShardOrder) -> dict[str, bytes]:
     Raises:
         ValueError: what `collect_dataset` refuses.
     """
-    import torch
-
-    from mission.dataset.collect import CollectOptions, write_episodes
-
-    torch.set_num_threads(1)
+    use_one_thread()
     with tempfile.TemporaryDirectory(prefix="honeyguide-shard-") as made:
         folder, policy = Path(made), order.policy
         if order.weights is not None:
