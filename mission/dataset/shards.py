@@ -111,21 +111,21 @@ def collect_shards(
 
 def _open(folder: Path, whole: ShardOrder, count: int) -> None:
     """Makes the folder of shards, or finds it to be of the same collection."""
-    told = asdict(whole) | {"shards": count, "env_args": list(whole.env_args)}
-    told["weights"] = hashlib.sha256(whole.weights).hexdigest() if whole.weights is not None else None
+    record = asdict(whole) | {"shards": count, "env_args": list(whole.env_args)}
+    record["weights"] = hashlib.sha256(whole.weights).hexdigest() if whole.weights is not None else None
     try:
         folder.mkdir(exist_ok=True)
         file = folder / ORDER_FILE
         if file.is_file():
             there = json.loads(file.read_text(encoding="utf-8"))
-            for key, value in told.items():
+            for key, value in record.items():
                 if there.get(key) != value:
                     raise DatasetError(
                         f"{folder}: holds shards of another collection: {key} is {there.get(key)} there, "
                         f"and here {value}; remove it to begin anew"
                     )
         else:
-            write_whole(file, json.dumps(told, indent=2).encode())
+            write_whole(file, json.dumps(record, indent=2).encode())
     except OSError as error:
         raise DatasetError(f"{folder}: cannot be read or written: {error.strerror or error}") from error
     except ValueError as error:

@@ -66,6 +66,6 @@ def await_round() -> bool:
     Raises:
         RuntimeError: another process has ended.
     """
-    told = torch.zeros(1, dtype=torch.int64)
-    distributed.broadcast(told, src=0)
-    return bool(told.item())
+    word = torch.zeros(1, dtype=torch.int64)
+    distributed.broadcast(word, src=0)
+    return bool(word.item())
