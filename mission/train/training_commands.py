@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 _EnvArgs = Annotated[
     list[str] | None, typer.Option(help="A setting of the task: KEY=VALUE, as preset=improved. Repeatable.")
 ]
+_Strict = Annotated[
+    bool, typer.Option("--strict", help="Drop misplaced keys as ML-Agents does: no network memory from flat keys.")
+]
 _Processes = Annotated[
     int | None, typer.Option(min=1, max=64, help="Processes that train together, by an offline algorithm.")
 ]
@@ -50,9 +53,7 @@ def train(
     num_areas: Annotated[int | None, typer.Option(help="Environments side by side.")] = None,
     env_args: _EnvArgs = None,
     behavior: Annotated[str | None, typer.Option(help="Which behaviour of a file that has several.")] = None,
-    strict: Annotated[
-        bool, typer.Option("--strict", help="Drop misplaced keys as ML-Agents does: no network memory from flat keys.")
-    ] = False,
+    strict: _Strict = False,
     results_dir: Annotated[str | None, typer.Option(help="Folder of all runs. Default: results.")] = None,
     torch_device: Annotated[str | None, typer.Option(help="Where networks are computed: cpu, cuda.")] = None,
     processes: _Processes = None,
