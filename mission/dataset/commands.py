@@ -81,14 +81,27 @@ def collect(
     ] = 0.0,
     env_args: _EnvArgs = None,
     seed: _Seed = 0,
+    shards: Annotated[
+        int | None, typer.Option(min=1, help="Collect in so many parts, which are kept when it is interrupted.")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="With --shards: processes at a time. Default: one per core.")
+    ] = None,
+    ray: Annotated[str | None, typer.Option(help="With --shards: address of a Ray head, HOST:PORT.")] = None,
 ) -> None:
     """Collect episodes of the batch simulator as a dataset."""
+    for option, value in (("--jobs", jobs), ("--ray", ray)):
+        if value is not None and shards is None:
+            refuse(f"{option}: goes with --shards")
+    if jobs is not None and ray is not None:
+        refuse("--jobs: not with --ray, whose cluster has its own")
     with _refusing():
         check_task(task)
         with loading(Console()):
             from mission.dataset.collect import CollectOptions, collect_dataset
 
-        options = CollectOptions(task, policy, episodes, output, noise, seed, tuple(env_args or ()))
+        settings = tuple(env_args or ())
+        options = CollectOptions(task, policy, episodes, output, noise, seed, settings, shards, jobs, ray)
         collect_dataset(options, Console())
 
 
