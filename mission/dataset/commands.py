@@ -98,7 +98,8 @@ def collect(
     with _refusing():
         check_task(task)
         with loading(Console()):
-            from mission.dataset.collect import CollectOptions, collect_dataset
+            from mission.dataset.collect import collect_dataset
+            from mission.dataset.write_episodes import CollectOptions
 
         settings = tuple(env_args or ())
         options = CollectOptions(task, policy, episodes, output, noise, seed, settings, shards, jobs, ray)

@@ -128,7 +128,7 @@ def _telling(each: Judged) -> tuple[int, int]:
         if math.isclose(float(column.min()), float(column.max())):
             spread.append(-1.0)
             continue
-        order = np.array_split(each.distances[np.argsort(column, kind="stable")], 10)
-        spread.append(float(np.std([part.mean() for part in order if len(part)])))
+        deciles = np.array_split(each.distances[np.argsort(column, kind="stable")], 10)
+        spread.append(float(np.std([part.mean() for part in deciles if len(part)])))
     order = np.argsort(spread)[::-1]
     return int(order[0]), int(order[min(1, len(order) - 1)])
