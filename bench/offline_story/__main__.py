@@ -53,7 +53,12 @@ def main(
     console.print(f"chosen: {chosen}")
     flown = _fly(folder, chosen, flights, jobs)
     write_page(
-        folder, forecast, flown, chosen, {"clumsy": clumsy, "shipped": shipped, "steps": steps, "seconds": SECONDS}
+        folder,
+        forecast,
+        validated,
+        flown,
+        chosen,
+        {"clumsy": clumsy, "shipped": shipped, "steps": steps, "seconds": SECONDS},
     )
 
 
