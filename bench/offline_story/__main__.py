@@ -48,11 +48,17 @@ def main(
     _build(folder)
     _train(folder, steps)
     forecast = _forecast(folder, jobs)
-    chosen = max(forecast["policies"], key=lambda name: forecast["policies"][name]["mean"])
-    console.print(f"forecast: {chosen}")
+    validated = _validate(folder)
+    chosen = max(validated, key=lambda name: sum(found["in_band"][0] for found in validated[name].values()))
+    console.print(f"chosen: {chosen}")
     flown = _fly(folder, chosen, flights, jobs)
     write_page(
-        folder, forecast, flown, chosen, {"clumsy": clumsy, "shipped": shipped, "steps": steps, "seconds": SECONDS}
+        folder,
+        forecast,
+        validated,
+        flown,
+        chosen,
+        {"clumsy": clumsy, "shipped": shipped, "steps": steps, "seconds": SECONDS},
     )
 
 
@@ -117,6 +123,17 @@ def _forecast(folder: Path, jobs: int) -> dict[str, Any]:
         policies = {name: folder / "runs" / name / "FollowMe.pt" for name in TRAINERS}
         datasets = [folder / "datasets" / name for name in PILOTS]
         write_whole(path, json.dumps(forecast(datasets, policies, jobs), indent=1).encode())
+    return dict(json.loads(path.read_text(encoding="utf-8")))
+
+
+def _validate(folder: Path) -> dict[str, Any]:
+    """How the policies do in batch, in worlds of training, alone: the one that flies is chosen by this."""
+    from bench.offline_story.batch import judged
+
+    path = folder / "validated.json"
+    if not path.exists():
+        found = judged({name: folder / "runs" / name / "FollowMe.pt" for name in TRAINERS}, "train")
+        write_whole(path, json.dumps(found, indent=1).encode())
     return dict(json.loads(path.read_text(encoding="utf-8")))
 
 

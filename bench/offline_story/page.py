@@ -17,20 +17,26 @@ TITLES = {"clumsy": "mediocre pilot", "offline": "learnt from the logs", "shippe
 
 
 def write_page(
-    folder: Path, forecast: dict[str, Any], flown: dict[str, Any], chosen: str, sizes: dict[str, Any]
+    folder: Path,
+    forecast: dict[str, Any],
+    validated: dict[str, Any],
+    flown: dict[str, Any],
+    chosen: str,
+    sizes: dict[str, Any],
 ) -> None:
     """The section of the page that is measured, and the picture."""
     lines = [
         f"Logged: {sizes['clumsy']} flights of the mediocre pilot and {sizes['shipped']} of the follower that ships, "
         f"{sizes['seconds']:.0f} s each, {forecast['decisions']:,} decisions; {sizes['steps']:,} gradient steps each.",
         "",
-        "| learnt by | forecast, discounted | 95 % | off the recorded actions |",
-        "|---|---|---|---|",
+        "| learnt by | forecast from the logs | 95 % | off the recorded actions | walk, batch | run, batch |",
+        "|---|---|---|---|---|---|",
     ]
     for name, found in sorted(forecast["policies"].items(), key=lambda item: -item[1]["mean"]):
         mark = " (flown)" if name == chosen else ""
         interval = f"{found['low']:.2f} to {found['high']:.2f}"
-        lines.append(f"| {name}{mark} | {found['mean']:.2f} | {interval} | {found['away']:.3f} |")
+        bands = " | ".join(f"{100 * validated[name][pace]['in_band'][0]:.1f} %" for pace in ("walk", "run"))
+        lines.append(f"| {name}{mark} | {found['mean']:.2f} | {interval} | {found['away']:.3f} | {bands} |")
     lines += [
         "",
         "| flown over MAVLink | condition | flights | within 1 to 3 m | no collision |",

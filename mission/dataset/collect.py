@@ -1,34 +1,18 @@
 """`honeyguide dataset collect`: episodes of the batch simulator as a dataset, by a policy, an expert or chance."""
 
-from dataclasses import dataclass
-from pathlib import Path
+import os
+from collections.abc import Callable
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from mission.console.terminal import print_line
-from mission.train.play import PlayOptions, cast
-from policies.datasets.collecting import NoisyDriver, collected
-from policies.datasets.episodes import DatasetError, DatasetOrigin
-from policies.datasets.writer import DatasetWriter
+from mission.dataset.shards import Collectors, ShardOrder, collect_shards, shard_orders
+from mission.dataset.write_episodes import EXPERT, RANDOM, CollectOptions, write_episodes
+from mission.train.play import PlayError
+from policies.datasets.reader import DatasetReader
 from policies.experts.demonstration_file import check_is_free
-from policies.experts.episode_recording import MAX_ROWS
-from policies.tasks.catalogue import settings_of
-
-EXPERT, RANDOM = "expert", "random"
-
-
-@dataclass(frozen=True, slots=True)
-class CollectOptions:
-    """What the command is given."""
-
-    task: str
-    policy: str
-    episodes: int
-    out: Path
-    noise: float = 0.0
-    seed: int = 0
-    env_args: tuple[str, ...] = ()
+from policies.learn.export.policy_path import CheckpointError, find_policy
 
 
 def collect_dataset(options: CollectOptions, console: Console) -> None:
@@ -40,31 +24,41 @@ def collect_dataset(options: CollectOptions, console: Console) -> None:
         DemonstrationFileError: the same.
     """
     check_is_free(options.out)
-    is_named = options.policy not in (EXPERT, RANDOM)
-    rows = min(options.episodes, MAX_ROWS)
-    played = PlayOptions(
-        options.task,
-        options.episodes,
-        rows,
-        options.seed,
-        options.env_args,
-        options.policy if is_named else None,
-        options.policy == RANDOM,
-        options.policy == EXPERT,
-        None,
-    )
-    task, driver, name = cast(played)
-    if task.layout.image is not None:
-        raise DatasetError(f"{task.layout.task}: shows images as it is set, and datasets of episodes hold none")
-    settings = getattr(task, "settings", None) or settings_of(options.task, options.env_args)
-    pilot = (Path(name).stem if is_named else options.policy) + (f"-noise-{options.noise:g}" if options.noise else "")
-    origin = DatasetOrigin(task.layout, settings.model_dump(mode="json"), pilot, options.seed)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console) as bar, DatasetWriter(options.out, origin) as writer:
+    with Progress(*columns, console=console) as bar:
         line = bar.add_task(options.task, total=options.episodes)
-        noisy = NoisyDriver(driver, options.noise, options.seed)
-        writer.add_all(
-            collected(task, noisy, options.episodes, options.seed, lambda count: bar.update(line, completed=count))
-        )
-    words = f"{writer.episodes} episodes, {writer.successes} of them successful, {writer.steps} decisions"
+        if options.shards is None:
+            write_episodes(options, lambda count: bar.update(line, completed=count))
+        else:
+            _collect_shards(options, options.shards, lambda count: bar.update(line, completed=count))
+    with DatasetReader(options.out) as reader:
+        words = f"{reader.count} episodes, {reader.successes} of them successful, {reader.steps} decisions"
     print_line(console, f"{options.out}: {words}")
+
+
+def _collect_shards(options: CollectOptions, count: int, note: Callable[[int], None]) -> None:
+    """Collects by other processes, of this machine or of a cluster."""
+    weights = None
+    if options.policy not in (EXPERT, RANDOM):
+        try:
+            path = find_policy(options.policy)
+        except CheckpointError as error:
+            raise PlayError(str(error)) from None
+        weights, policy = path.read_bytes(), path.stem
+    else:
+        policy = options.policy
+    whole = ShardOrder(
+        0, options.task, policy, options.episodes, options.noise, options.seed, options.env_args, weights
+    )
+    shard_orders(whole, count)  # refuses before anybody is asked
+    collect_shards(whole, count, options.out, _collectors(options), note)
+
+
+def _collectors(options: CollectOptions) -> Collectors:
+    if options.ray is not None:
+        from mission.dataset.ray_collectors import RayCollectors
+
+        return RayCollectors(options.ray)
+    from mission.dataset.process_collectors import ProcessCollectors
+
+    return ProcessCollectors(options.jobs or len(os.sched_getaffinity(0)))

@@ -1,4 +1,4 @@
-"""The commands of `honeyguide dataset`: build, collect, show, merge, split, filter, export."""
+"""The commands of `honeyguide dataset`: build, collect, show, judge, model, merge, split, filter, export."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -81,14 +81,28 @@ def collect(
     ] = 0.0,
     env_args: _EnvArgs = None,
     seed: _Seed = 0,
+    shards: Annotated[
+        int | None, typer.Option(min=1, help="Collect in so many parts, which are kept when it is interrupted.")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="With --shards: processes at a time. Default: one per core.")
+    ] = None,
+    ray: Annotated[str | None, typer.Option(help="With --shards: address of a Ray head, HOST:PORT.")] = None,
 ) -> None:
     """Collect episodes of the batch simulator as a dataset."""
+    for option, value in (("--jobs", jobs), ("--ray", ray)):
+        if value is not None and shards is None:
+            refuse(f"{option}: goes with --shards")
+    if jobs is not None and ray is not None:
+        refuse("--jobs: not with --ray, whose cluster has its own")
     with _refusing():
         check_task(task)
         with loading(Console()):
-            from mission.dataset.collect import CollectOptions, collect_dataset
+            from mission.dataset.collect import collect_dataset
+            from mission.dataset.write_episodes import CollectOptions
 
-        options = CollectOptions(task, policy, episodes, output, noise, seed, tuple(env_args or ()))
+        settings = tuple(env_args or ())
+        options = CollectOptions(task, policy, episodes, output, noise, seed, settings, shards, jobs, ray)
         collect_dataset(options, Console())
 
 
@@ -104,6 +118,54 @@ def show(
         from mission.dataset.show import show_dataset
 
         show_dataset(dataset, Console(), picture=picture, film=mp4, episode=episode)
+
+
+@app.command()
+def judge(
+    datasets: Annotated[list[Path], typer.Argument(help="Datasets of one task and layout.")],
+    policy: Annotated[list[str], typer.Option(help="A policy: a file, a run or a name. Repeatable.")],
+    gamma: Annotated[
+        float | None, typer.Option(min=0.0, max=0.9999, help="Discount; left out: that of the task's recipe.")
+    ] = None,
+    width: Annotated[float, typer.Option(min=0.01, max=2.0, help="Of the Gaussian around a policy's actions.")] = 0.2,
+    clip: Annotated[float, typer.Option(min=1.0, help="Of importance weights, from above.")] = 1000.0,
+    steps: Annotated[int, typer.Option(min=1, help="Gradient steps of fitted Q evaluation.")] = 3000,
+    picture: Annotated[Path | None, typer.Option(help="Write where policies leave the data as a PNG.")] = None,
+    json_file: Annotated[Path | None, typer.Option("--json", help="Write the figures as JSON.")] = None,
+    seed: _Seed = 0,
+) -> None:
+    """Judge policies without flying: returns from recorded decisions, with intervals."""
+    with _refusing():
+        with loading(Console()):
+            from mission.dataset.judge import JudgeOptions, judge_policies
+
+        files = picture, json_file
+        options = JudgeOptions(tuple(datasets), tuple(policy), gamma, width, clip, steps, seed, *files)
+        judge_policies(options, Console())
+
+
+@app.command()
+def model(
+    datasets: Annotated[list[Path], typer.Argument(help="Datasets of one task and layout.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="The file to make, which `train` takes as model:FILE.")
+    ],
+    steps: Annotated[int, typer.Option(min=1, help="Gradient steps at most.")] = 20_000,
+    hidden: Annotated[int, typer.Option(min=1, max=4096, help="Units of each of two layers.")] = 128,
+    seed: _Seed = 0,
+) -> None:
+    """Learn a model of a task's dynamics, to train in where no simulator fits."""
+    with _refusing():
+        with loading(Console()):
+            from policies.datasets.episodes import DatasetError
+            from policies.learn.rollout.demonstrations import DemonstrationError
+            from policies.offline.dynamics.model_file import ModelError, fit_and_save
+
+        try:
+            made = fit_and_save([str(path) for path in datasets], output, steps=steps, seed=seed, hidden=hidden)
+        except (DemonstrationError, ModelError) as error:
+            raise DatasetError(str(error)) from error
+        typer.echo(f"{output}: explains {100 * (1 - made.networks.held_out):.1f} % of held-out variance")
 
 
 @app.command()

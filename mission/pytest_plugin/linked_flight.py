@@ -20,7 +20,7 @@ from mission.boards.ardupilot_drone import ArduPilotDrone
 from mission.boards.px4_drone import Px4Drone
 from mission.client import CLIENT_COMPONENT_ID, CLIENT_SYSTEM_ID, ScriptError
 from mission.console.option_checks import UserError
-from mission.over_udp import POLL_US, SILENCE_S, RemoteVehicle
+from mission.over_udp import POLL_US, RemoteVehicle
 from mission.plan.plan_file import read_plan
 from mission.pytest_plugin.heard_telemetry import JUDGED, HeardTelemetry
 from mission.pytest_plugin.marker import part_of
@@ -33,6 +33,7 @@ from mission.scenario.scenario import Scenario
 from mission.script import Drone, fly_plan
 
 DRONES: dict[int, type[Drone]] = {3: ArduPilotDrone, 12: Px4Drone}  # MAV_AUTOPILOT
+FIRST_S = 30.0  # until a vehicle is heard: some are still loading
 _SHORT = re.compile(r"(udpin|udpout|tcp|serial):(?!//)(.+)")  # as pymavlink and MAVProxy write them
 _LANDING_S = 300.0  # that a vehicle may take to land after a test that leaves it in the air: guess
 
@@ -176,7 +177,7 @@ def _vehicle_at(address: str) -> tuple[Link, tuple[int, int]]:
     except LinkError as error:
         raise UserError(f"--link {error}") from error
     end = ClientEnd(link, CLIENT_SYSTEM_ID, CLIENT_COMPONENT_ID)
-    pacer, polled_us, end_s = Pacer(1.0), 0, wall_time_s() + SILENCE_S
+    pacer, polled_us, end_s = Pacer(1.0), 0, wall_time_s() + FIRST_S
     while wall_time_s() < end_s:
         end.keep_alive(polled_us)
         for arrived in end.arrived():
@@ -186,7 +187,7 @@ def _vehicle_at(address: str) -> tuple[Link, tuple[int, int]]:
         polled_us += POLL_US
         pacer.wait_until(polled_us)
     link.close()
-    pytest.exit(f"--link {address}: no vehicle has been heard for {SILENCE_S:g} s", returncode=1)
+    pytest.exit(f"--link {address}: no vehicle has been heard for {FIRST_S:g} s", returncode=1)
 
 
 def _check_can_be_judged(check: Check) -> None:

@@ -21,6 +21,12 @@ if TYPE_CHECKING:
 _EnvArgs = Annotated[
     list[str] | None, typer.Option(help="A setting of the task: KEY=VALUE, as preset=improved. Repeatable.")
 ]
+_Strict = Annotated[
+    bool, typer.Option("--strict", help="Drop misplaced keys as ML-Agents does: no network memory from flat keys.")
+]
+_Processes = Annotated[
+    int | None, typer.Option(min=1, max=64, help="Processes that train together, by an offline algorithm.")
+]
 _TASK_OR_CONFIG = typer.Argument(
     help="A task or recipe by name, module:Class of a task of yours, or an ML-Agents .yaml file."
 )
@@ -40,18 +46,17 @@ def train(
     initialize_from: Annotated[str | None, typer.Option(help="Start from the networks of this run.")] = None,
     inference: Annotated[bool, typer.Option("--inference", help="Play the run's policy; learn nothing.")] = False,
     deterministic: Annotated[
-        bool, typer.Option("--deterministic", help="With --inference: the most probable actions.")
+        bool, typer.Option("--deterministic", help="With --inference: likeliest actions.")
     ] = False,
     seed: Annotated[int | None, typer.Option(help="Seed of every random draw. Default: a new one.")] = None,
     num_envs: Annotated[int | None, typer.Option(help="Copies of the num-areas environments.")] = None,
     num_areas: Annotated[int | None, typer.Option(help="Environments side by side.")] = None,
     env_args: _EnvArgs = None,
     behavior: Annotated[str | None, typer.Option(help="Which behaviour of a file that has several.")] = None,
-    strict: Annotated[
-        bool, typer.Option("--strict", help="Drop misplaced keys as ML-Agents does: no network memory from flat keys.")
-    ] = False,
+    strict: _Strict = False,
     results_dir: Annotated[str | None, typer.Option(help="Folder of all runs. Default: results.")] = None,
     torch_device: Annotated[str | None, typer.Option(help="Where networks are computed: cpu, cuda.")] = None,
+    processes: _Processes = None,
     keep_checkpoints: Annotated[int | None, typer.Option(help="How many of the newest checkpoints stay.")] = None,
     save_freq: Annotated[int | None, typer.Option(help="Steps between checkpoints.")] = None,
     curriculum: Annotated[str | None, typer.Option(help="A curriculum file of ML-Agents 0.15.")] = None,

@@ -12,8 +12,13 @@ from policies.datasets.reader import DatasetReader
 from policies.datasets.writer import DatasetWriter
 
 
-def merge(sources: Sequence[Path], folder: Path) -> int:
+def merge(sources: Sequence[Path], folder: Path, seed: int | None = None) -> int:
     """One dataset of the episodes of several, in order; returns how many there are.
+
+    Args:
+        sources: folders of datasets.
+        folder: to be made.
+        seed: that it is said to come from; none: that of the first.
 
     Raises:
         DatasetError: they are of different tasks, versions or presets, or one cannot be read or written.
@@ -24,7 +29,8 @@ def merge(sources: Sequence[Path], folder: Path) -> int:
         first = readers[0]
         for reader in readers[1:]:
             first.layout.require(reader.layout, str(reader.folder))
-        with DatasetWriter(folder, _merged([reader.origin for reader in readers])) as writer:
+        origin = _merged([reader.origin for reader in readers])
+        with DatasetWriter(folder, origin if seed is None else replace(origin, seed=seed)) as writer:
             for reader in readers:
                 writer.add_all(reader)
         return writer.episodes

@@ -13,7 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from policies.datasets.episodes import DatasetError, DatasetOrigin, EpisodeRows
-from policies.datasets.writer import MAIN_FILE, METADATA_FILE, NOTES_KEY, PILOT_KEY, REWARDS_KEY, SEED_KEY
+from policies.datasets.writer import (
+    MAIN_FILE,
+    METADATA_FILE,
+    NOTES_KEY,
+    PILOT_KEY,
+    REWARDS_KEY,
+    SEED_KEY,
+    SUCCESSES_KEY,
+)
 from policies.experts.demonstration_file import LAYOUT_KEY, SETTINGS_KEY
 from policies.tasks.layout import Layout
 
@@ -36,6 +44,7 @@ class DatasetReader:
         try:
             record = json.loads(path.read_text(encoding="utf-8"))
             self.count, self.steps = int(record["total_episodes"]), int(record["total_steps"])
+            self.successes = int(record.get(SUCCESSES_KEY, 0))
         except FileNotFoundError as error:
             raise DatasetError(f"{folder}: is no dataset: {METADATA_FILE} is missing") from error
         except (OSError, ValueError, KeyError, TypeError) as error:

@@ -26,6 +26,7 @@ from policies.learn.export.onnx_export import ParityError, export_policy
 from policies.learn.export.policy_file import CHECKPOINT, POLICY, PolicyCard, policy_record, save_policy
 from policies.learn.export.policy_path import CheckpointError
 from policies.learn.networks.policy import Policy
+from policies.learn.processes import check_processes, together
 from policies.learn.success_target import SuccessTarget
 from policies.learn.torch_threads import few_threads
 from policies.learn.training_curves import EventFile, Period
@@ -99,7 +100,7 @@ def train(config: RunConfig, watcher: Watcher) -> Result:
     """Trains until max_steps, success_target, or until the watcher stops it.
 
     Raises:
-        RunError: the run exists already, or does not exist, or its files cannot be written.
+        RunError: the run exists already, or does not exist, its files cannot be written, or one of its processes ended.
         CheckpointError: a checkpoint cannot be written or read, or is of a run with other settings.
         ExportError: a network cannot be written.
         LayoutError: a checkpoint of another task.
@@ -107,8 +108,13 @@ def train(config: RunConfig, watcher: Watcher) -> Result:
         UnknownTask: no such task, or a setting that it has not.
     """
     try:
+        check_processes(config)
         training = Training(config, watcher)
-        with few_threads(has_images=training.task.layout.image is not None):
+        count = config.torch_settings.processes
+        with (
+            few_threads(has_images=training.task.layout.image is not None, processes=count),
+            together(training.config, training.learner),
+        ):
             return training.run()
     except OSError as error:
         folder = RunFolder.of(config).path

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import torch
 from torch import Tensor, nn
 
+from policies.learn.averaging import own_noise
 from policies.learn.networks.action_distributions import CLIP, ActionDistribution
 from policies.learn.networks.policy import Policy
 from policies.offline.losses import LOG_DEVIATION_LIMITS, choice_log_probs, gaussian_log_probs
@@ -58,8 +59,7 @@ class ActionModel:
     def draw(self, distribution: ActionDistribution, generator: torch.Generator) -> Tensor:
         """Continuous actions in [-1, 1]."""
         mean = self.mean(distribution)
-        noise = torch.randn(mean.shape, generator=generator, device=mean.device)
-        return (mean + noise * self.log_deviation(distribution).exp()).clamp(-1.0, 1.0)
+        return (mean + own_noise(mean, generator) * self.log_deviation(distribution).exp()).clamp(-1.0, 1.0)
 
     def log_probs(self, distribution: ActionDistribution, continuous: Tensor, branches: Tensor) -> Tensor:
         """Of whole actions, shape (B,)."""

@@ -1,9 +1,9 @@
 """Fitted Q evaluation: what a policy would return, learnt from decisions of others (Le, Voloshin and Yue 2019).
 
 In: a store and a policy that has no memory. Out: its mean discounted return from where the recorded episodes began,
-with an interval. Several networks learn from the same decisions; they and the episodes are drawn anew for the interval
-(bootstrap). Nothing is simulated. Where the policy does what was never recorded, it is a guess, and `away` says how far
-off that is.
+with an interval. Each of several networks learns from episodes of its own, drawn anew of the recorded ones (bootstrap);
+how much they differ and how much the beginnings differ make the interval. Nothing is simulated. Where the policy does
+what was never recorded, it is a guess, and `away` says how far off that is.
 """
 
 import copy
@@ -19,7 +19,7 @@ from policies.offline.store import OfflineStore
 
 MEMBERS = 5
 _TAU, _RATE, _BATCH, _ROWS = 0.01, 1.0e-3, 512, 8192
-_DRAWS = 1000  # of the bootstrap
+_T = 2.776  # Student's, 95 % of MEMBERS - 1 degrees of freedom
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,44 +58,60 @@ class FittedQ:
         self._targets = copy.deepcopy(self._networks).requires_grad_(False)
         self._target_vector = flatten(self._targets.parameters())
         self._optimizer = FlatOptimizer(self._networks.parameters(), _RATE)
-        self._actions = _actions_of(policy, store)
-        self._unit = max(statistics.reward_deviation, 1e-6) / (1.0 - gamma)  # of values: they are learnt as about 1
+        self.actions = _actions_of(policy, store)  # (rows, actions) the policy's own
+        drawn = torch.randint(store.episode_count, (MEMBERS, store.episode_count), generator=self._generator)
+        counts = torch.stack([torch.bincount(each, minlength=store.episode_count) for each in drawn]).float()
+        self._counts = torch.repeat_interleave(counts, store.lengths, dim=1)  # (members, decisions)
+        self._unit = max(_return_size(store, gamma), statistics.reward_deviation, 1e-6)  # values are learnt as about 1
         rewards = store.rewards[store.decisions]
         self._bounds = float(rewards.min()) / (1.0 - gamma), float(rewards.max()) / (1.0 - gamma)
 
     def fit(self, steps: int) -> None:
         """So many gradient steps."""
-        low, high = (bound / self._unit for bound in self._bounds)
+        low, high = self._bounds[0] / self._unit - 1.0, self._bounds[1] / self._unit + 1.0  # room: else noise is bias
         for _ in range(steps):
             drawn = torch.randint(len(self._store), (_BATCH,), generator=self._generator)
             rows = self._store.decisions[drawn]
             batch = self._store.take(rows)
             with torch.no_grad():
-                next_values = self._targets(self._inputs(batch.next_observations, self._actions[rows + 1]))[..., 0]
+                next_values = self._targets(self._inputs(batch.next_observations, self.actions[rows + 1]))[..., 0]
                 goes_on = 1.0 - batch.is_terminated
                 wanted = batch.rewards / self._unit + self._gamma * goes_on * next_values.clamp(low, high)
             values = self._networks(self._inputs(batch.observations, batch.continuous))[..., 0]
-            self._optimizer.step((values - wanted).square().mean(dim=1).sum())
+            self._optimizer.step((self._counts[:, drawn] * (values - wanted).square()).mean(dim=1).sum())
             self._target_vector.lerp_(self._optimizer.vector.detach(), _TAU)
 
     @torch.no_grad()
     def estimate(self) -> Estimate:
         """From the first decisions of all episodes."""
         first = self._store.starts
-        inputs = self._inputs(self._store.observations[first], self._actions[first])
+        inputs = self._inputs(self._store.observations[first], self.actions[first])
         values = self._unit * self._targets(inputs)[..., 0]  # (members, episodes)
-        draws = []
-        for _ in range(_DRAWS):
-            members = torch.randint(MEMBERS, (MEMBERS,), generator=self._generator)
-            episodes = torch.randint(len(first), (len(first),), generator=self._generator)
-            draws.append(values[members][:, episodes].mean())
-        low, high = torch.stack(draws).quantile(torch.tensor([0.025, 0.975])).tolist()
+        mean = float(values.mean())
+        beginnings = float(values.mean(dim=0).var()) / len(first) if len(first) > 1 else 0.0
+        half = _T * (float(values.mean(dim=1).var()) + beginnings) ** 0.5
         decisions = self._store.decisions
-        apart = self._actions[decisions] - self._store.continuous[decisions]
-        return Estimate(float(values.mean()), low, high, float(apart.square().mean().sqrt()))
+        apart = self.actions[decisions] - self._store.continuous[decisions]
+        return Estimate(mean, mean - half, mean + half, float(apart.square().mean().sqrt()))
+
+    @torch.no_grad()
+    def values(self, rows: Tensor, actions: Tensor) -> Tensor:
+        """What actions (B, actions) are worth at the observations of some rows (B,), shape (B,)."""
+        parts = zip(torch.split(rows, _ROWS), torch.split(actions, _ROWS), strict=True)
+        found = [self._targets(self._inputs(self._store.observations[a], b))[..., 0].mean(dim=0) for a, b in parts]
+        return self._unit * torch.cat(found)
 
     def _inputs(self, observations: Tensor, actions: Tensor) -> Tensor:
         return torch.cat([((observations - self._mean) * self._scale).clamp(-10.0, 10.0), actions], dim=-1)
+
+
+def _return_size(store: OfflineStore, gamma: float) -> float:
+    """The root mean square of the discounted returns of the recorded episodes."""
+    episodes = torch.repeat_interleave(torch.arange(store.episode_count), store.lengths)
+    passed = (store.decisions - store.starts[episodes]).double()
+    paid = store.rewards[store.decisions].double() * gamma**passed
+    returns = torch.zeros(store.episode_count, dtype=torch.float64).index_add_(0, episodes, paid)
+    return float(returns.square().mean().sqrt())
 
 
 @torch.no_grad()

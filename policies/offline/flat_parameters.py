@@ -1,7 +1,7 @@
 """Parameters of several networks as views of one vector: one gradient, one step of Adam, one move of a target.
 
 This is the only place where offline training takes a gradient and makes a step; several processes that train together
-would average the gradient between the two.
+average the gradient between the two.
 """
 
 from collections.abc import Iterable, Mapping
@@ -9,6 +9,8 @@ from typing import Any
 
 import torch
 from torch import Tensor, nn
+
+from policies.learn.averaging import averaged
 
 
 def flatten(parameters: Iterable[nn.Parameter]) -> Tensor:
@@ -39,8 +41,8 @@ class FlatOptimizer:
         self._adam = torch.optim.Adam([self.vector], lr=learning_rate, fused=True)
 
     def step(self, loss: Tensor) -> None:
-        """One step down the slope of a loss; parameters that it does not depend on stay."""
-        self._apply(self._gradient(loss))
+        """One step down the slope of a loss, the mean of all processes'; parameters that none depends on stay."""
+        self._apply(averaged(self._gradient(loss)))
 
     def set_learning_rate(self, learning_rate: float) -> None:
         """Of the next steps."""

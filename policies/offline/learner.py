@@ -1,6 +1,7 @@
 """The offline learner: gradient steps on recorded decisions, now and then an evaluation in the simulator.
 
-One iteration is a block of gradient steps, whose minibatches are drawn at once. Its statistics stay tensors until the
+One iteration is a block of gradient steps, whose minibatches are drawn at once; of several processes, each draws all
+and takes its part, and the first evaluates. Its statistics stay tensors until the
 block is over. The training loop is that of PPO and SAC: a step is a gradient step.
 """
 
@@ -12,6 +13,7 @@ import torch
 
 from policies.learn.algorithms.learner import Iteration
 from policies.learn.algorithms.schedule import RATE_FLOOR, scheduled
+from policies.learn.averaging import averaged, call_round, own_part, rank
 from policies.learn.config.behavior import Behavior
 from policies.learn.config.offline import BcHyperparameters, OfflineHyperparameters
 from policies.learn.evaluate import Evaluation
@@ -74,15 +76,16 @@ class OfflineLearner:
         done = before / self._behavior.max_steps
         rate = scheduled(hyperparameters.learning_rate, RATE_FLOOR, hyperparameters.learning_rate_schedule, done)
         self.algorithm.set_learning_rate(rate)
-        rows = self._draws.block(steps, self._generator)
+        call_round(goes_on=True)
+        rows = own_part(self._draws.block(steps, self._generator), dim=-1)
         made = [self.algorithm.step(each) for each in rows]
         self.steps += steps
-        statistics = dict(zip(self.algorithm.tags, torch.stack(made).mean(dim=0).tolist(), strict=True))
+        statistics = dict(zip(self.algorithm.tags, averaged(torch.stack(made).mean(dim=0)).tolist(), strict=True))
         statistics["Policy/Learning Rate"] = rate
         scores = _NO_SCORES
         interval = self._settings.evaluation_interval
         is_due = self.steps // interval > before // interval or self.steps >= self._behavior.max_steps
-        is_evaluation = bool(self._settings.evaluation_episodes) and is_due
+        is_evaluation = bool(self._settings.evaluation_episodes) and is_due and rank() == 0
         if is_evaluation:
             scores = self._evaluate(statistics)
         return Iteration(steps, scores, statistics, is_evaluation)

@@ -60,7 +60,9 @@ def weighted_cloning_loss(log_probs: Tensor, weights: Tensor) -> Tensor:
     return -(weights * log_probs).mean()
 
 
-def td3_bc_policy_loss(values: Tensor, actions: Tensor, recorded: Tensor, alpha: float) -> Tensor:
+def td3_bc_policy_loss(
+    values: Tensor, actions: Tensor, recorded: Tensor, alpha: float, size: Tensor | None = None
+) -> Tensor:
     """TD3+BC eq. 3: climbs the critic, whose values are brought to mean size `alpha`, and stays at what was recorded.
 
     Args:
@@ -68,8 +70,10 @@ def td3_bc_policy_loss(values: Tensor, actions: Tensor, recorded: Tensor, alpha:
         actions: the policy's, shape (B, continuous actions).
         recorded: shape (B, continuous actions).
         alpha: weight of the critic; 0 is behavioural cloning.
+        size: mean size of the values; none: that of these.
     """
-    scale = alpha / values.detach().abs().mean().clamp(min=1e-6)
+    mean_size = values.detach().abs().mean() if size is None else size
+    scale = alpha / mean_size.clamp(min=1e-6)
     return (actions - recorded).square().mean() - scale * values.mean()
 
 

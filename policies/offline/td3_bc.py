@@ -7,6 +7,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from policies.learn.averaging import averaged, own_noise
 from policies.learn.config.offline import Td3BcHyperparameters
 from policies.learn.networks.policy import Policy
 from policies.offline.action_model import ActionModel
@@ -73,18 +74,19 @@ class Td3Bc:
             mean = actions.mean(actions(batch.observations))
             seen = side_by_side(batch.observations, mean.clamp(-1.0, 1.0))
             first = self._critics.networks(seen, count=1)[0, :, 0]
-            loss = td3_bc_policy_loss(first, mean, batch.continuous, self._settings.alpha)
+            size = averaged(first.detach().abs().mean())
+            loss = td3_bc_policy_loss(first, mean, batch.continuous, self._settings.alpha, size)
             self._policy_optimizer.step(loss)
             self._critics.follow(self._critic_optimizer)
             self._target_vector.lerp_(self._policy_optimizer.vector.detach(), self._settings.tau)
-            self._policy_loss = loss.detach()
+            self._policy_loss = averaged(loss)
         return torch.stack((critic_loss.detach(), self._policy_loss, values.detach().mean()))
 
     @torch.no_grad()
     def _targets(self, rewards: Tensor, is_terminated: Tensor, next_observations: Tensor) -> Tensor:
         """Of the critics: the target policy's next action, somewhat blurred, by the lesser target critic."""
         mean = self._target_actions.mean(self._target_actions(next_observations))
-        noise = torch.randn(mean.shape, generator=self._generator, device=mean.device)
+        noise = own_noise(mean, self._generator)
         limit = self._settings.target_noise_limit
         noise = noise.mul_(self._settings.target_noise).clamp_(-limit, limit)
         seen = side_by_side(next_observations, (mean + noise).clamp_(-1.0, 1.0))

@@ -1,8 +1,8 @@
 """Tasks by name: what `honeyguide train NAME` and `gymnasium.make("honeyguide/NAME-v0")` build.
 
 A name is one of the catalogue below, one that an installed package has given in its entry points `honeyguide.tasks`,
-`module:Class` of a task of one's own, or `gym:ID` of any Gymnasium environment. Light to import: a task's kernels are
-imported when it is asked for.
+`module:Class` of a task of one's own, `gym:ID` of any Gymnasium environment, or `model:PATH` of a model learnt from
+logs. Light to import: a task's kernels are imported when it is asked for.
 """
 
 import re
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 ENTRY_POINTS = "honeyguide.tasks"
 GYM = "gym:"
 """What the names of Gymnasium's environments begin with here."""
+MODEL = "model:"
+"""What the names of models that were learnt from logs begin with; a path follows."""
 
 
 _MODULE_CLASS = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_][\w.]*")
@@ -70,6 +72,9 @@ def task_class(name: "str | type[Task]") -> "type[Task]":
         return cast("type[Task]", resolve_name(f"policies.tasks.{at}") if isinstance(at, str) else at)
     if name.startswith(GYM):
         return _gym_class(name)
+    if name.startswith(MODEL):
+        model_class: Callable[[str], type[Task]] = resolve_name("policies.offline.dynamics.model_task:model_class")
+        return model_class(name.removeprefix(MODEL))
     package_entry = _package_entries().get(name)
     if package_entry is None and ":" not in name:
         raise UnknownTask(f"{name}: no such task; there are {', '.join(task_names())}, and module:Class for your own")
@@ -207,13 +212,18 @@ def task_names() -> list[str]:
 
 
 def is_task_name(name: str) -> bool:
-    """Whether it names a task, and not a policy: one of `task_names`, `gym:ID` or `module:Class`."""
-    return name in CATALOGUE or name.startswith(GYM) or bool(_MODULE_CLASS.fullmatch(name)) or name in task_names()
+    """Whether it names a task, and not a policy: one of `task_names`, `gym:ID`, `model:PATH` or `module:Class`."""
+    return (
+        name in CATALOGUE
+        or name.startswith((GYM, MODEL))
+        or bool(_MODULE_CLASS.fullmatch(name))
+        or name in task_names()
+    )
 
 
 def runs_code(name: str) -> bool:
     """Whether building a task imports a module that the name itself names: what a file says is not done by itself."""
-    return ":" in name.removeprefix(GYM)
+    return not name.startswith(MODEL) and ":" in name.removeprefix(GYM)
 
 
 def check_name(name: str) -> None:

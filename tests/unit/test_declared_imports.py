@@ -35,7 +35,7 @@ PLACES = {
     ),
     "lerobot": ("policies/datasets/exporting.py",),
     "test": ("mission/pytest_plugin",),
-    "ray": ("mission/campaign/workers/ray_cluster.py",),
+    "ray": ("mission/campaign/workers/ray_cluster.py", "mission/dataset/ray_collectors.py"),
     "dev": ("tests",),
     "bench": ("bench",),
     "mutants": ("tests/mutants",),

@@ -44,6 +44,9 @@ class CommandLine:
     num_areas: int | None = _flag(None, "env_settings.num_areas", "Environments side by side.")
     results_dir: str | None = _flag(None, "checkpoint_settings.results_dir", "Folder of all runs.")
     torch_device: str | None = _flag(None, "torch_settings.device", "Where networks are computed: cpu, cuda, cuda:0.")
+    processes: int | None = _flag(
+        None, "torch_settings.processes", "Processes that train together; of offline algorithms. Not of ML-Agents."
+    )
     debug: bool = _flag(False, "debug", "Log more.")
     base_port: int | None = _flag(None, "env_settings.base_port", "Accepted.")
     timeout_wait: int | None = _flag(None, "env_settings.timeout_wait", "Accepted.")

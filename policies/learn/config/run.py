@@ -29,10 +29,12 @@ class CheckpointSettings(Block):
 
 
 class TorchSettings(Block):
-    """Where networks are computed."""
+    """Where networks are computed, and by how many processes."""
 
     device: str | None = None
     """`cpu`, `cuda`, `cuda:0`; none: `cpu`."""
+    processes: int = Field(default=1, ge=1, le=64)
+    """Processes that divide each minibatch of an offline algorithm among them."""
 
 
 class RunConfig(Block):

@@ -148,7 +148,7 @@ configs = st.builds(
     env_settings=st.builds(EnvSettings, env_path=maybe(texts), env_args=st.lists(texts, max_size=3), num_areas=counts),
     engine_settings=st.builds(EngineSettings, time_scale=positives, no_graphics=st.booleans()),
     checkpoint_settings=st.builds(CheckpointSettings, run_id=texts, initialize_from=maybe(texts), resume=st.booleans()),
-    torch_settings=st.builds(TorchSettings, device=maybe(texts)),
+    torch_settings=st.builds(TorchSettings, device=maybe(texts), processes=st.integers(1, 64)),
     debug=st.booleans(),
 )
 

@@ -1,0 +1,1 @@
+"""How well policies are judged without flying."""

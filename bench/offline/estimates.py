@@ -1,0 +1,150 @@
+"""Estimates of policies from recorded decisions against the truth: `python -m bench.offline.estimates`.
+
+RollerBall. Recorded are the shipped policy with much noise, and chance. Judged are checkpoints of a short training and
+the shipped policy with ever more noise on its weights; the truth is what each returns in the batch simulator, from the
+beginnings that the recordings have. Prints Spearman's rank correlation and how many intervals hold the truth, writes a
+JSON row and the page's section.
+"""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import torch
+import typer
+from numpy.typing import NDArray
+from rich.console import Console
+
+from bench.offline.page import ESTIMATES, write_page
+from common.files import write_whole
+from common.intervals import Z_95
+from policies.learn.export.policy_file import load_policy
+from policies.learn.networks.policy import Policy
+from policies.offline.evaluation.judge import Judge, JudgeSettings
+from policies.offline.store import open_store
+from policies.pretrained.pretrained_policies import pretrained
+from policies.tasks.catalogue import build_task
+
+TASK, GAMMA = "RollerBall", 0.99  # of its recipe
+RECORDED = {"noisy": ("roller-ball", 0.8), "chance": ("random", 0.0)}
+WEIGHT_NOISES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8)
+TRAINED_STEPS, CHECKPOINTS = 280_000, 7
+TRUTH_SEED = 771
+
+
+def main(
+    folder: Annotated[Path, typer.Option(help="Where datasets and runs lie.")] = Path("results/offline-estimates"),
+    episodes: Annotated[int, typer.Option(min=10, max=256, help="Of each dataset, all from the same beginning.")] = 256,
+    truth: Annotated[int, typer.Option(min=500, help="Episodes that the truth is the mean of.")] = 2000,
+    steps: Annotated[int, typer.Option(min=100, help="Of fitted Q evaluation.")] = 3000,
+) -> None:
+    """Judges all policies and compares."""
+    torch.set_num_threads(1)
+    console = Console(highlight=False)
+    folder.mkdir(parents=True, exist_ok=True)
+    _record(folder, episodes)
+    policies = _policies(folder)
+    store = open_store([str(folder / name) for name in RECORDED])
+    judge = Judge(store, JudgeSettings(GAMMA, steps=steps))
+    rows = []
+    for name, policy in policies.items():
+        began = time.process_time()
+        verdict = judge.judge(policy)
+        returns = true_returns(policy, truth)
+        row: dict[str, Any] = {
+            "policy": name,
+            "truth": float(returns.mean()),
+            "truth_half": float(Z_95 * returns.std() / len(returns) ** 0.5),
+            "outside": verdict.outside_fraction,
+            "effective": verdict.effective_episodes,
+            "cpu_s": time.process_time() - began,
+        }
+        for key in ESTIMATES:
+            found = getattr(verdict, key)
+            row[key] = [found.value, found.low, found.high]
+        rows.append(row)
+        console.print(json.dumps(row))
+    summary = {key: _compared(rows, key) for key in ESTIMATES}
+    content = {"decisions": len(store), "episodes": store.episode_count, "truth_episodes": truth, "steps": steps}
+    write_whole(folder / "estimates.json", json.dumps(content | {"rows": rows, "summary": summary}, indent=1).encode())
+    write_page(content, rows, summary)
+    console.print(summary)
+
+
+def _compared(rows: list[dict[str, Any]], key: str) -> dict[str, float]:
+    """Rank correlation with the truth, and how many intervals hold it."""
+    held = sum(row[key][1] <= row["truth"] <= row[key][2] for row in rows)
+    estimates, truths = np.array([row[key][0] for row in rows]), np.array([row["truth"] for row in rows])
+    return {"spearman": spearman(estimates, truths), "held": held, "of": len(rows)}
+
+
+def spearman(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """The correlation of the ranks, of values without ties."""
+    ranks = [np.argsort(np.argsort(values)) for values in (a, b)]
+    return float(np.corrcoef(ranks[0], ranks[1])[0, 1])
+
+
+@torch.inference_mode()
+def true_returns(policy: Policy, episodes: int) -> NDArray[np.float64]:
+    """Discounted returns in the batch simulator, of one episode of each environment."""
+    task = build_task(TASK, episodes)
+    task.reset(TRUTH_SEED)
+    returns, runs, discount = np.zeros(episodes), np.ones(episodes, np.bool_), 1.0
+    while runs.any():
+        seen = torch.from_numpy(task.buffers.observations.numpy().copy())
+        actions, _ = policy.act(seen, policy.start_memory(episodes))
+        task.buffers.continuous.assign(policy.bounded(actions).numpy())
+        task.step()
+        returns += discount * task.buffers.rewards.numpy() * runs
+        runs &= task.buffers.outcomes.numpy() == 0
+        discount *= GAMMA
+    return returns
+
+
+def _record(folder: Path, episodes: int) -> None:
+    for k, (name, (policy, noise)) in enumerate(RECORDED.items()):
+        if not (folder / name).exists():
+            words = ("--episodes", str(episodes), "--noise", str(noise), "--seed", str(10 + k))
+            _honeyguide("dataset", "collect", TASK, "--policy", policy, "-o", str(folder / name), *words)
+
+
+def _policies(folder: Path) -> dict[str, Policy]:
+    """Checkpoints of a training, and the shipped policy with noise on its weights, in deviations of each tensor."""
+    run = folder / "runs" / "graded"
+    if not run.exists():
+        recipe = Path(__file__).parents[2] / "policies" / "recipes" / "roller-ball.yaml"
+        text = recipe.read_text(encoding="utf-8").replace("max_steps: 1000000", f"max_steps: {TRAINED_STEPS}")
+        text = text.replace(
+            "    success_target: 0.99\n", f"    keep_checkpoints: {CHECKPOINTS}\n    even_checkpoints: true\n"
+        )
+        (folder / "graded.yaml").write_text(text, encoding="utf-8")
+        words = ("--run-id", "graded", "--results-dir", str(folder / "runs"), "--seed", "1")
+        _honeyguide("train", str(folder / "graded.yaml"), *words)
+    files = sorted(run.glob(f"**/{TASK}-*.pt"), key=lambda path: int(path.stem.split("-")[-1]))
+    policies = {path.stem: load_policy(path)[0] for path in files}
+    shipped = pretrained(TASK)
+    if shipped is None:
+        raise SystemExit(f"no policy of {TASK} ships")
+    generator = torch.Generator().manual_seed(5)
+    for noise in WEIGHT_NOISES:
+        policy = load_policy(shipped)[0]
+        with torch.no_grad():
+            for weights in policy.parameters():
+                if weights.dim() > 1:
+                    weights.add_(torch.randn(weights.shape, generator=generator), alpha=noise * float(weights.std()))
+        policies[f"shipped, noise {noise:g}"] = policy
+    return policies
+
+
+def _honeyguide(*words: str) -> None:
+    ended = subprocess.run([str(Path(sys.executable).with_name("honeyguide")), *words], check=False)
+    if ended.returncode:
+        raise SystemExit(f"honeyguide {' '.join(words[:2])} failed")
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,56 @@
+"""docs/results/offline-estimates.md and its image, from what estimates came to."""
+
+from pathlib import Path
+from typing import Any
+
+from bench.page_section import with_section
+from common.files import write_whole
+
+PAGE = Path(__file__).parents[2] / "docs" / "results" / "offline-estimates.md"
+IMAGE = PAGE.parent / "images" / "offline-estimates.png"
+HEADING = "## What it came to"
+ESTIMATES = {"fitted_q": "fitted Q", "importance": "importance-weighted", "robust": "doubly robust"}
+
+
+def write_page(content: dict[str, Any], rows: list[dict[str, Any]], summary: dict[str, dict[str, float]]) -> None:
+    """The section of the page that is measured, and the image."""
+    lines = [
+        f"{content['decisions']:,} decisions of {content['episodes']} episodes; the truth is the mean of "
+        f"{content['truth_episodes']:,} episodes of each of {len(rows)} policies.",
+        "",
+        "| estimate | Spearman with the truth (wanted: 0.8) | 95 % intervals that hold the truth (wanted: 10 of 12) |",
+        "|---|---|---|",
+    ]
+    for key, title in ESTIMATES.items():
+        found = summary[key]
+        lines.append(f"| {title} | {found['spearman']:.3f} | {found['held']} of {found['of']} |")
+    lines += ["", f"| policy | truth | {' | '.join(ESTIMATES.values())} | effective episodes | outside |"]
+    lines.append("|" + "---|" * (len(ESTIMATES) + 4))
+    for row in rows:
+        found = " | ".join(f"{row[key][0]:.3f} ({row[key][1]:.3f} to {row[key][2]:.3f})" for key in ESTIMATES)
+        truth = f"{row['truth']:.3f} ± {row['truth_half']:.3f}"
+        lines.append(f"| {row['policy']} | {truth} | {found} | {row['effective']:.0f} | {100 * row['outside']:.0f} % |")
+    section = "\n".join((HEADING, "", *lines, "", "![Estimates and truth](images/offline-estimates.png)", ""))
+    write_whole(PAGE, with_section(PAGE.read_text(encoding="utf-8"), HEADING, section).encode())
+    _draw(rows)
+
+
+def _draw(rows: list[dict[str, Any]]) -> None:
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, len(ESTIMATES), figsize=(9.0, 3.2), layout="constrained", sharey=True)
+    for axis, (key, title) in zip(axes, ESTIMATES.items(), strict=True):
+        truth, value = [row["truth"] for row in rows], [row[key][0] for row in rows]
+        below = [max(0.0, row[key][0] - row[key][1]) for row in rows]
+        above = [max(0.0, row[key][2] - row[key][0]) for row in rows]
+        axis.errorbar(truth, value, yerr=[below, above], fmt="o", ms=4, capsize=2, color="#0072b2")
+        axis.axline((0.0, 0.0), slope=1.0, color="#9a9a9a", lw=1)
+        axis.set_title(title)
+        axis.set_xlabel("true discounted return")
+    axes[0].set_ylabel("estimate, 95 %")
+    IMAGE.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(IMAGE, dpi=100)
+    plt.close(figure)

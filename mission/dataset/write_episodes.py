@@ -1,0 +1,61 @@
+"""Episodes of the batch simulator written as one dataset, by a policy, an expert or chance."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from mission.train.play import PlayOptions, cast
+from policies.datasets.collecting import NoisyDriver, collected
+from policies.datasets.episodes import DatasetError, DatasetOrigin
+from policies.datasets.writer import DatasetWriter
+from policies.experts.episode_recording import MAX_ROWS
+from policies.tasks.catalogue import settings_of
+
+EXPERT, RANDOM = "expert", "random"
+
+
+@dataclass(frozen=True, slots=True)
+class CollectOptions:
+    """What the command is given."""
+
+    task: str
+    policy: str
+    episodes: int
+    out: Path
+    noise: float = 0.0
+    seed: int = 0
+    env_args: tuple[str, ...] = ()
+    shards: int | None = None
+    jobs: int | None = None
+    ray: str | None = None
+
+
+def write_episodes(options: CollectOptions, note: Callable[[int], None] = lambda _: None) -> None:
+    """Collects and writes in one go.
+
+    Raises:
+        UnknownTask, NoExpert, PlayError, LayoutError: the task, its settings or the policy cannot be used.
+        DatasetError: the task shows images, or the dataset cannot be written.
+        DemonstrationFileError: the same.
+    """
+    is_named = options.policy not in (EXPERT, RANDOM)
+    played = PlayOptions(
+        options.task,
+        options.episodes,
+        min(options.episodes, MAX_ROWS),
+        options.seed,
+        options.env_args,
+        options.policy if is_named else None,
+        options.policy == RANDOM,
+        options.policy == EXPERT,
+        None,
+    )
+    task, driver, name = cast(played)
+    if task.layout.image is not None:
+        raise DatasetError(f"{task.layout.task}: shows images as it is set, and datasets of episodes hold none")
+    settings = getattr(task, "settings", None) or settings_of(options.task, options.env_args)
+    pilot = (Path(name).stem if is_named else options.policy) + (f"-noise-{options.noise:g}" if options.noise else "")
+    origin = DatasetOrigin(task.layout, settings.model_dump(mode="json"), pilot, options.seed)
+    noisy = NoisyDriver(driver, options.noise, options.seed)
+    with DatasetWriter(options.out, origin) as writer:
+        writer.add_all(collected(task, noisy, options.episodes, options.seed, note))
