@@ -16,7 +16,9 @@ PIP = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
 OF_EXTRAS = (
     *("policies.", "mission.view.", "mission.train.", "mission.follow.", "mission.park.park_session"),
     *("mission.benchmark.", "mission.pytest_plugin.", "mission.foxglove."),
-    *("mission.world.world_export", "mission.world.world_shapes"),
+    *("mission.world.world_export", "mission.world.world_shapes", "mission.dataset.build", "mission.dataset.collect"),
+    *("mission.dataset.judge", "mission.dataset.process_collectors", "mission.dataset.ray_collectors"),
+    *("mission.dataset.shards", "mission.dataset.show", "mission.dataset.write_episodes"),
     *("mission.scenario.flight.companions", "mission.scenario.flight.policy_steps"),
     "mission.scenario.judging.policy_figures",
     *("sim.engines.bullet", "sim.engines.jsbsim_", "sim.engines.quiet_"),
@@ -79,8 +81,12 @@ def test_a_bare_environment_flies_and_imports_all_but_what_extras_bring(tmp_path
     refused = run(python.with_name("honeyguide"), "fly", "--engine", "pybullet")
     assert refused.returncode == 2, refused.stderr
     assert "the extra 'engines'" in refused.stderr
-    benchmark = ("benchmark", "park", "--policy", "parking1")
-    for needs_extra in (("companion", "--policy", "scripted"), ("train", "Parking1"), ("play", "Parking1"), benchmark):
+    needing = (
+        *(("companion", "--policy", "scripted"), ("train", "Parking1"), ("play", "Parking1")),
+        ("benchmark", "park", "--policy", "parking1"),
+        ("dataset", "collect", "Hover", "--policy", "expert", "-o", "hovers"),
+    )
+    for needs_extra in needing:
         refused = run(python.with_name("honeyguide"), *needs_extra)
         assert refused.returncode == 2, refused.stderr
         assert "the extra 'learn'" in refused.stderr
