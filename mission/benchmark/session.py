@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from common.files import write_whole
+from common.pool_worker import end_with_parent
 from mission.benchmark.benchmark import FIRST_SEED, benchmark_of
 
 
@@ -58,7 +59,10 @@ def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
     ]
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     spawned = multiprocessing.get_context("spawn")
-    with Progress(*columns, console=console) as progress, ProcessPoolExecutor(options.jobs, spawned) as pool:
+    with (
+        Progress(*columns, console=console) as progress,
+        ProcessPoolExecutor(options.jobs, spawned, end_with_parent) as pool,
+    ):
         bar = progress.add_task("flights", total=len(flights))
         for flight, outcome in zip(flights, pool.map(_flown, flights), strict=True):
             outcomes[flight.condition].append(outcome)

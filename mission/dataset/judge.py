@@ -10,9 +10,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from common.files import part_path, write_whole
+from common.files import write_whole
 from common.intervals import Interval
 from mission.console.terminal import print_line
+from mission.dataset.show import write_figure
 from policies.datasets.episodes import DatasetError
 from policies.offline.evaluation.datasets import Judged, judged
 
@@ -110,15 +111,7 @@ def draw(found: list[Judged], target: Path) -> None:
         histogram.axvline(each.limit, color="#d55e00")
         histogram.set_xlabel("deviations off the recorded actions")
         histogram.set_ylabel("decisions")
-    part = part_path(target)
-    try:
-        figure.savefig(part, dpi=70, format="png")
-        part.replace(target)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise DatasetError(f"{target}: cannot be written: {error.strerror or error}") from error
-    finally:
-        plt.close(figure)
+    write_figure(figure, target, 70)
 
 
 def _telling(each: Judged) -> tuple[int, int]:

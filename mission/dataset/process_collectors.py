@@ -1,14 +1,13 @@
 """Shards collected by processes of this machine. Where one is killed, what it and its neighbours had is begun anew."""
 
 import multiprocessing
-import os
 import signal
-import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
+from common.pool_worker import end_with_parent
 from mission.dataset.collect_shard import collect_into
 from mission.dataset.shards import ShardOrder
 from policies.datasets.episodes import DatasetError
@@ -58,11 +57,4 @@ class ProcessCollectors:
 def _begin() -> None:
     """The process ends with the one that began it, however that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-    os._exit(1)
+    end_with_parent()

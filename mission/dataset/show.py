@@ -86,9 +86,20 @@ def _draw(found: DatasetStatistics, target: Path) -> None:
     for place in places[len(names) + 2 :]:
         place.axis("off")
     figure.tight_layout()
+    write_figure(figure, target, 80)
+
+
+def write_figure(figure: Any, target: Path, dpi: int) -> None:
+    """Writes a figure of matplotlib, and closes it.
+
+    Raises:
+        DatasetError: it cannot be written.
+    """
+    import matplotlib.pyplot as plt
+
     part = part_path(target)
     try:
-        figure.savefig(part, dpi=80, format="png")
+        figure.savefig(part, dpi=dpi, format="png")
         part.replace(target)
     except OSError as error:
         part.unlink(missing_ok=True)

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from common.files import write_whole
+from common.pool_worker import end_with_parent
 from mission.console.option_checks import UserError
 from mission.console.terminal import print_line
 from mission.scenario.junit import junit_text
@@ -112,7 +113,7 @@ def _flown(planned: Sequence[Planned], jobs: int, console: Console) -> list[Flow
             for index, each in enumerate(planned):
                 note(index, fly(each))
         else:
-            with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+            with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), end_with_parent) as pool:
                 order = sorted(range(len(planned)), key=lambda index: -_weight(planned[index].scenario))
                 futures = {pool.submit(fly, planned[index]): index for index in order}
                 try:

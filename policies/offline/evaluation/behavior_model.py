@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from policies.offline.flat_parameters import FlatOptimizer
+from policies.offline.losses import gaussian_log_probs
 from policies.offline.stacked_networks import StackedNetworks
 from policies.offline.store import OfflineStore
 
@@ -58,18 +59,12 @@ class BehaviorModel:
 
     def log_density(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Of actions, shape (rows,)."""
-        return gaussian_log_density(actions, *self(observations))
+        return gaussian_log_probs(*self(observations), actions)
 
     def distance(self, observations: Tensor, actions: Tensor) -> Tensor:
         """How many deviations actions are from the mean, as a length, shape (rows,)."""
         mean, log_deviation = self(observations)
         return ((actions - mean) * (-log_deviation).exp()).square().sum(-1).sqrt()
-
-
-def gaussian_log_density(actions: Tensor, mean: Tensor, log_deviation: Tensor) -> Tensor:
-    """Of a Gaussian with independent actions, shape (rows,)."""
-    squares = ((actions - mean) * (-log_deviation).exp()).square()
-    return -(0.5 * squares + log_deviation + 0.5 * math.log(2.0 * math.pi)).sum(-1)
 
 
 def split_rows(store: OfflineStore, generator: torch.Generator) -> tuple[Tensor, Tensor]:

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from common.intervals import Interval
 from policies.learn.networks.policy import Policy
-from policies.offline.evaluation.behavior_model import BehaviorModel, gaussian_log_density
+from policies.offline.evaluation.behavior_model import BehaviorModel
 from policies.offline.evaluation.weighted_returns import (
     Floats,
     PaddedEpisodes,
@@ -22,6 +22,7 @@ from policies.offline.evaluation.weighted_returns import (
     importance_weighted,
 )
 from policies.offline.fitted_q import FittedQ
+from policies.offline.losses import gaussian_log_probs
 from policies.offline.store import OfflineStore
 
 CLIP = 1000.0  # of the weights (guess)
@@ -109,7 +110,7 @@ class Judge:
         rows = store.decisions
         own, done = fitted.actions[rows], store.continuous[rows]
         log_width = torch.full_like(own, float(np.log(width)))
-        ratios = gaussian_log_density(done, own, log_width) - self._densities
+        ratios = gaussian_log_probs(own, log_width, done) - self._densities
         generator = torch.Generator().manual_seed(self._settings.seed)
         values = torch.zeros(len(rows))
         for _ in range(_OWN_ACTIONS):
