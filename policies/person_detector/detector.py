@@ -22,7 +22,7 @@ STRIDE = 4  # pixels of a cell
 RANGE_M = (0.4, 16.0)  # that it tells apart
 _NO_RETURN = 255.0
 _APART = 2  # cells between two people
-_AGREES = 0.45  # of the logarithms of two ranges
+_AGREES = (-0.9, 0.45)  # by how much depth may differ from the range by colours, in logarithms
 _SAME_BODY = 0.15  # likewise, of pixels of one body
 _BODY_PX = (8, 4)  # to either side of a chest, where its body is looked for
 _COLOURS_SHORT = 1.12  # by which ranges by colours alone are too short; measured in flights
@@ -130,7 +130,10 @@ def peaks(scores: NDArray[np.float32], least: float) -> list[tuple[int, int]]:
 
 
 def _checked_range(range_m: float, depth: NDArray[np.uint8], row: int, column: int) -> float | None:
-    """The range that depth shows, if it agrees with what the colours say; None: it does not, and nobody is there."""
+    """The range that depth shows, if it agrees with what the colours say; None: it does not, and nobody is there.
+
+    Of what agrees the nearest: round a body there is ground, and nobody is to be thought farther off than they are.
+    """
     first_row, first_column = STRIDE * row, STRIDE * column
     byte = depth[first_row : first_row + STRIDE, first_column : first_column + STRIDE].astype(np.float64)
     returns = byte[byte < _NO_RETURN]
@@ -138,8 +141,9 @@ def _checked_range(range_m: float, depth: NDArray[np.uint8], row: int, column: i
         return range_m
     steps = (np.array([first_row, first_column]) + 0.5 * STRIDE - 0.5 * depth.shape[0]) * (2.0 / depth.shape[0])
     shown_m = depth_of(returns) * sqrt(1.0 + float((steps * _HALF_WIDTH) @ (steps * _HALF_WIDTH)))
-    nearest = shown_m[np.argmin(np.abs(np.log(shown_m / range_m)))]
-    return float(nearest) if abs(log(nearest / range_m)) < _AGREES else None
+    off = np.log(shown_m / range_m)
+    agrees = (off > _AGREES[0]) & (off < _AGREES[1])
+    return float(shown_m[agrees].min()) if agrees.any() else None
 
 
 def _middle(scores: NDArray[np.float32], row: int, column: int) -> tuple[float, float]:

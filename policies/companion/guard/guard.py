@@ -29,6 +29,7 @@ _SEARCH_PERIOD_S = 15.0  # of a search towards the phone: at first it looks ther
 _SEARCH_FACES_S = 4.0  # and then round it
 _THERE_M = 2.0  # so near the stand-off it looks round
 _RISEN_US = 2_000_000  # for so long it stays over the owner
+_AGES_S = 60.0  # silence that is no number is so long
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 
 
@@ -94,7 +95,7 @@ class Guard:
             level, down = scale * level, scale * down
             yaw_rate = self._facing_owner(own, yaw_rate)
             self.interventions[self.stance.value] += 1
-        level, owner = self._past_owner(level, own, age_s)
+        level, owner = self._past_owner(level, own)
         level = self._flown = self._past_solids(level, own, owner)
         down = self._within_heights(down, own)
         return (float(level[0]), float(level[1]), float(down)), yaw_rate
@@ -138,22 +139,25 @@ class Guard:
         known = self.senses.owner_now(own)
         if known is None or not self.senses.is_heard:
             return yaw_rate
-        way = known[0][:2] - np.array(own.pos_ned[:2])
+        way = known.pos_ned[:2] - np.array(own.pos_ned[:2])
         return self._facing(atan2(way[1], way[0]), own)
 
     def _facing(self, bearing_rad: float, own: Own) -> float:
         error = wrapped(bearing_rad - yaw_of(own.q_ned_from_frd))
         return float(np.clip(_FACE_GAIN * error, -_YAW_MAX, _YAW_MAX))
 
-    def _past_owner(self, level: Floats, own: Own, age_s: float) -> tuple[Floats, Somebody | None]:
+    def _past_owner(self, level: Floats, own: Own) -> tuple[Floats, Somebody | None]:
         """The velocity without what brings it too near to the owner, and what it has to do with them."""
         known, s = self.senses.owner_now(own), self.settings
         self._is_too_near = False
         if known is None:
             return level, None
-        way = known[0][:2] - np.array(own.pos_ned[:2])
-        own_vel, vel = wp.vec2(*own.vel_ned[:2]), wp.vec2(*known[1][:2])
-        bound = bounds(self._keep_off, wp.vec2(*way), own_vel, vel, age_s, float(known[0][2]) - own.pos_ned[2])
+        way = known.pos_ned[:2] - np.array(own.pos_ned[:2])
+        over_m = float(known.pos_ned[2]) - own.pos_ned[2]
+        own_vel, vel = wp.vec2(*own.vel_ned[:2]), wp.vec2(*known.vel)
+        bound = bounds(
+            self._keep_off, wp.vec2(*way), own_vel, vel, known.vel_std(way), min(known.silence_s, _AGES_S), over_m
+        )
         self._is_too_near = bound.then_m < s.owner_m
         self._sinking_max = bound.sinking_max
         owner = Somebody(way / max(float(np.hypot(*way)), 1e-3), bound.closing_max, bound.then_m < s.pressed_m)

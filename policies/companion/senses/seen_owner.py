@@ -51,3 +51,8 @@ class SeenOwner:
         self._asked["age_s"] = (time_us - self.time_us) * 1e-6
         self._now.launch()
         return self._out[0].astype(np.float64), self._velocity[0].astype(np.float64)
+
+    @property
+    def vel_var(self) -> Floats:
+        """Covariance of the velocity at the newest sight [m²/s²], (2, 2)."""
+        return np.asarray(self._row["both"]["vel_var"][0], np.float64)

@@ -219,7 +219,7 @@ def asked(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState
     command = next_command(state.tracked.commands[i], action, q_ned_from_frd)
     if state.params[i].guard == 1.0:
         own = own_state(rig, i, rules.has_estimator)
-        command = guarded(command, own, state.tracked.filters[i], state.image_ages_s[i], rules.keep_off)
+        command = guarded(command, own, state.tracked.filters[i], rules.keep_off)
     state.tracked.before[i] = state.tracked.commands[i]
     state.tracked.commands[i] = command
     return command

@@ -1,6 +1,6 @@
 """What the guard makes of what a policy asks for, as far as it goes by the owner: the part that training has too.
 
-In: the velocity asked for, the vehicle's own state, the owner's filter, the picture's age. Out: what is flown. What the
+In: the velocity asked for, the vehicle's own state, the owner's filter. Out: what is flown. What the
 guard does about trees it does by a map, which training has not.
 """
 
@@ -8,7 +8,7 @@ import warp as wp
 
 from policies.tasks.flight.own_state import Command, OwnState
 from policies.tasks.follow_me.tracked.keep_off import SLOW_S, STOP_S, KeepOff, bounds, kept_off
-from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, place_now, velocity_now
+from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, place_now, velocity_now, velocity_std
 
 wp.set_module_options({"enable_backward": False})
 
@@ -16,7 +16,7 @@ _SLOW_S, _STOP_S = wp.constant(SLOW_S), wp.constant(STOP_S)
 
 
 @wp.func
-def guarded(command: Command, own: OwnState, owner: OwnerFilter, image_age_s: float, k: KeepOff) -> Command:
+def guarded(command: Command, own: OwnState, owner: OwnerFilter, k: KeepOff) -> Command:
     """What is flown of a command."""
     if owner.is_known == 0:
         return command
@@ -24,7 +24,8 @@ def guarded(command: Command, own: OwnState, owner: OwnerFilter, image_age_s: fl
     place = place_now(owner)
     way = wp.vec2(place[0] - own.pos_ned[0], place[1] - own.pos_ned[1])
     own_vel = wp.vec2(own.vel_ned[0], own.vel_ned[1])
-    b = bounds(k, way, own_vel, velocity_now(owner), image_age_s, place[2] - own.pos_ned[2])
+    over_m = place[2] - own.pos_ned[2]
+    b = bounds(k, way, own_vel, velocity_now(owner), velocity_std(owner, way), owner.age_s, over_m)
     level = kept_off(scale * wp.vec2(command.vel_ned[0], command.vel_ned[1]), way, b.closing_max)
     command.vel_ned = wp.vec3(level[0], level[1], wp.min(scale * command.vel_ned[2], b.sinking_max))
     return command

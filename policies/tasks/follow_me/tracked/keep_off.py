@@ -1,9 +1,9 @@
 """How fast a vehicle may come nearer to somebody: the guard's rule, and what policies are trained under.
 
-Whoever walks away may have begun to stop when they were seen last; the way that takes them is room for the vehicle to
-stop in, after its reaction: the safe distance of responsibility-sensitive safety (Shalev-Shwartz et al. 2017, arXiv
-1708.06374), with late pictures. Whoever comes is given way to. One source: a guard calls these functions from Python,
-training in kernels.
+Whatever they do from when they were seen on (stop, turn, set off at the vehicle), it can stand before it is too near:
+the safe distance of responsibility-sensitive safety (Shalev-Shwartz et al. 2017, arXiv 1708.06374), with late pictures.
+Whoever goes away gives room as far as that speed is sure; whoever comes is given way to. One source: a guard calls
+these functions from Python, training in kernels.
 """
 
 from typing import Any
@@ -13,15 +13,14 @@ import warp as wp
 wp.set_module_options({"enable_backward": False})
 
 OWNER_M = 1.0  # [m] to the middle of the person: it comes no nearer
-OWNER_BRAKE_M_S2 = 4.5  # with which the vehicle is taken to brake before them
+OWNER_BRAKE_M_S2 = 3.5  # with which the vehicle is taken to brake before them; measured on the x500: 3.0 to 3.5
 REACTION_S = 0.35  # from a setpoint to the motion, besides the age of the picture; measured on the x500
 ESCAPE_CLIMB_M_S = 1.5  # nearer than allowed, until it is over their head
 _OVER_M = wp.constant(1.45)  # so far above their chest it is
 _OVER_GAIN = wp.constant(2.0)  # [1/s]
 SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
-_UNTOLD_S = wp.constant(0.8)  # who sets off is thought of for so long: from then on there are no pictures
-_STOPS_M_S2 = wp.constant(2.5)  # how fast a person stops, and sets off; guess
-_DOUBT_M_S = wp.constant(0.2)  # of the speed that the tracker says; guess
+_TURNS_M_S2 = wp.constant(2.5)  # how fast a person stops, turns and sets off; guess
+_UNTOLD_S = wp.constant(1.0)  # who was not seen for longer may be anywhere: nothing is reckoned from farther back
 _BACK_GAIN = wp.constant(3.0)  # [1/s]
 _BACK_MAX_M_S = wp.constant(4.0)
 
@@ -49,24 +48,17 @@ def keep_off(
 
 
 @wp.func
-def stopping_speed(room_m: float, delay_s: float, brake: float) -> float:
-    """The speed [m/s] from which one stands within a way [m], braking at so much [m/s²] after a delay [s]."""
-    lag = brake * delay_s
-    return wp.sqrt(lag * lag + 2.0 * brake * wp.max(room_m, 0.0)) - lag
+def come_m(since_s: float) -> float:
+    """How much nearer somebody has come who set off so long ago [m]."""
+    return 0.5 * _TURNS_M_S2 * since_s * since_s
 
 
 @wp.func
-def come_m(delay_s: float) -> float:
-    """How much nearer somebody comes who sets off now [m]."""
-    untold_s = wp.min(delay_s, _UNTOLD_S)
-    return 0.5 * _STOPS_M_S2 * untold_s * untold_s
-
-
-@wp.func
-def distance_then(way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, delay_s: float) -> float:
+def distance_then(way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, reaction_s: float, age_s: float) -> float:
     """How far away they are [m] when the vehicle answers, if both go on and they come at it besides."""
     far_m = wp.max(wp.length(way), 1.0e-3)
-    return far_m - delay_s * wp.max(wp.dot(own_vel - other_vel, way) / far_m, 0.0) - come_m(delay_s)
+    closing = wp.max(wp.dot(own_vel - other_vel, way) / far_m, 0.0)
+    return far_m - reaction_s * closing - come_m(reaction_s + wp.min(age_s, _UNTOLD_S))
 
 
 @wp.func
@@ -77,26 +69,37 @@ def level_m(k: KeepOff, over_m: float) -> float:
 
 
 @wp.func
-def closing_max(k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, age_s: float, over_m: float) -> float:
+def braking_s(room_m: float, losing: float, both: float) -> float:
+    """How long a vehicle may brake [s] that loses of its room [m] so much a second [m/s], and that faster and faster.
+
+    The largest root of `both / 2 t² + losing t = room_m`, `both` being how fast the two can change their speeds [m/s²].
+    """
+    return wp.max(wp.sqrt(wp.max(losing * losing + 2.0 * both * wp.max(room_m, 0.0), 0.0)) - losing, 0.0) / both
+
+
+@wp.func
+def closing_max(
+    k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, vel_std: float, age_s: float, over_m: float
+) -> float:
     """How fast it may come nearer to somebody [m/s]; negative: it has to give way.
 
-    `way` leads to where they would be by now [m]; `own_vel` it has until it answers; `age_s` ago they were seen;
-    so far above their chest.
+    `way` leads to where they would be by now [m]; `own_vel` it has until it answers; how uncertain their velocity is;
+    `age_s` ago they were seen; so far above their chest.
     """
     far_m = wp.max(wp.length(way), 1.0e-3)
     leaving = wp.dot(other_vel, way) / far_m
-    room_m = far_m - level_m(k, over_m)
-    given = wp.min(leaving, 0.0)
-    if leaving > 0.0:
-        sure = wp.max(leaving - _DOUBT_M_S, 0.0)
-        room_m += 0.5 * sure * sure / _STOPS_M_S2 - leaving * age_s
-    else:
-        room_m += leaving * (age_s + k.reaction_s)
-    room_m -= come_m(wp.max(age_s + k.reaction_s - wp.max(leaving, 0.0) / _STOPS_M_S2, 0.0))
+    sure = wp.max(leaving - vel_std, wp.min(leaving, 0.0))
+    untold_s = wp.min(age_s, _UNTOLD_S)
+    since_s = untold_s + k.reaction_s
+    room_m = far_m - level_m(k, over_m) - vel_std * untold_s + sure * k.reaction_s - come_m(since_s)
     left_m = room_m - k.reaction_s * wp.max(wp.dot(own_vel, way) / far_m, 0.0)
-    if left_m > 0.0:
-        return given + wp.min(stopping_speed(room_m, k.reaction_s, k.brake), stopping_speed(left_m, 0.0, k.brake))
-    return wp.max(given + _BACK_GAIN * left_m, -_BACK_MAX_M_S)
+    given = wp.min(sure, 0.0)
+    if left_m < 0.0:
+        return wp.max(given + _BACK_GAIN * left_m, -_BACK_MAX_M_S)
+    both = k.brake + _TURNS_M_S2
+    losing = _TURNS_M_S2 * since_s - wp.max(sure, 0.0)
+    steady_s = braking_s(room_m, losing + k.brake * k.reaction_s, both)  # at the speed that is asked for
+    return given + k.brake * wp.min(steady_s, braking_s(left_m, losing, both))
 
 
 @wp.func
@@ -124,10 +127,12 @@ class Bounds:
 
 
 @wp.func
-def bounds(k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, age_s: float, over_m: float) -> Bounds:
+def bounds(
+    k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, vel_std: float, age_s: float, over_m: float
+) -> Bounds:
     """All of the rule, of who was seen so long ago; as `closing_max` is asked."""
     b = Bounds()
-    b.closing_max = closing_max(k, way, own_vel, other_vel, age_s, over_m)
-    b.then_m = distance_then(way, own_vel, other_vel, k.reaction_s + age_s)
+    b.closing_max = closing_max(k, way, own_vel, other_vel, vel_std, age_s, over_m)
+    b.then_m = distance_then(way, own_vel, other_vel, k.reaction_s, age_s)
     b.sinking_max = sinking_max(k, over_m, b.then_m)
     return b

@@ -140,6 +140,12 @@ def velocity_now(f: OwnerFilter) -> wp.vec2:
     return slowing(f.age_s) * f.both.vel
 
 
+@wp.func
+def velocity_std(f: OwnerFilter, way: wp.vec2) -> float:
+    """How uncertain their speed along a way was when they were seen [m/s]: one standard deviation."""
+    return wp.sqrt(wp.max(wp.dot(way, f.both.vel_var * way) / wp.max(wp.dot(way, way), 1.0e-6), 0.0))
+
+
 @wp.kernel(enable_backward=False)
 def see_rows(
     filters: wp.array(dtype=OwnerFilter),
