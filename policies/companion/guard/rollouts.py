@@ -1,23 +1,30 @@
 """Where each velocity that it could be asked for leads a vehicle: the nearest to the wanted one that stays clear.
 
-A rollout is what it does until it answers, the change to the velocity asked for, and braking to a stand from there, all
-level, by an acceleration that it is taken to have. What is clear is so from the first sample to the last: whoever takes
-one of them can go on taking it.
+A rollout is what the vehicle does by what it was asked last, until it hears the new velocity, the change to that, and
+braking to a stand from there, all level. It answers with a lag, and no faster than by an acceleration that it is taken
+to have. What is clear is so from the first sample to the last: whoever takes one of them can go on taking it.
 """
 
 from dataclasses import dataclass
 
+from typing import Any
+
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
+from common.warp_start import start_warp
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.local_map import LocalMap
 from policies.companion.vehicle_link import Own
+
+wp.set_module_options({"enable_backward": False})
 
 Floats = NDArray[np.float64]
 _FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the speed that is wanted
 _TURNS = np.arange(-17, 19) * (np.pi / 18.0)
 _STEP_S, _STEPS = 0.05, 90  # coarser, it would pass over a trunk
+_HEARS_S = 0.1  # the part of a reaction in which nothing of a new velocity is seen: a decision; the rest is lag
 _NEARER_M = 0.1  # who is too near already may come so much nearer on the way out,
 _NEAREST_M = 0.1  # but by no more than this too near
 _STEADY = 0.3  # how much what was flown last counts beside what is wanted: not left, right and left again
@@ -97,22 +104,42 @@ def _candidates(wanted: Floats, last: Floats, unseen_speed: float) -> Floats:
 
 def _rolled(asked: Floats, own: Floats, last: Floats, s: GuardSettings) -> Floats:
     """Where each candidate leads from here [m], and so far ahead of it; shape (candidates, _STEPS + 1, 2)."""
-    time_s = (np.arange(_STEPS) + 0.5) * _STEP_S
-    answering = own + _changed(last - own, np.minimum(time_s, s.reaction_s), s.brake)  # (_STEPS, 2)
-    then = answering[-1]
-    change = asked - then
-    change_s = np.hypot(change[:, 0], change[:, 1]) / s.brake
-    done = np.clip((time_s[None] - s.reaction_s) / np.maximum(change_s, 1e-3)[:, None], 0.0, 1.0)
-    speed = np.hypot(asked[:, 0], asked[:, 1])
-    unit = asked / np.maximum(speed, 1e-6)[:, None]
-    braked = speed[:, None] - s.brake * np.maximum(time_s[None] - s.reaction_s - change_s[:, None], 0.0)
-    changing = answering[None] + done[..., None] * change[:, None]
-    velocity = np.where((done >= 1.0)[..., None], np.maximum(braked, 0.0)[..., None] * unit[:, None], changing)
-    way = np.cumsum(velocity * _STEP_S, axis=1) + done[..., None] * (s.solid_m * unit)[:, None]
-    return np.concatenate([np.zeros((len(asked), 1, 2)), way], axis=1)
+    start_warp()
+    way = wp.zeros((len(asked), _STEPS + 1), dtype=wp.vec2)
+    hears_s = min(_HEARS_S, s.reaction_s)
+    inputs: list[Any] = [wp.array(asked, dtype=wp.vec2), wp.vec2(*own), wp.vec2(*last), hears_s]
+    wp.launch(roll, len(asked), [*inputs, s.reaction_s - hears_s, s.brake, s.solid_m, _STEP_S, way])
+    return np.asarray(way.numpy(), np.float64)
 
 
-def _changed(change: Floats, time_s: Floats, brake: float) -> Floats:
-    """How much of a change of velocity has come after some times."""
-    whole_s = max(float(np.hypot(*change)) / brake, 1e-3)
-    return np.asarray(np.minimum(time_s / whole_s, 1.0)[:, None] * change)
+@wp.kernel(enable_backward=False)
+def roll(
+    asked: wp.array(dtype=wp.vec2),
+    own: wp.vec2,
+    last: wp.vec2,
+    hears_s: float,
+    lag_s: float,
+    brake: float,
+    ahead_m: float,
+    step_s: float,
+    way: wp.array2d(dtype=wp.vec2),
+) -> None:
+    """One candidate's rollout."""
+    i = wp.tid()
+    unit = asked[i] / wp.max(wp.length(asked[i]), 1.0e-6)
+    velocity = own
+    place = wp.vec2(0.0, 0.0)
+    changed_s = float(-1.0)  # when it has the velocity that it is asked for
+    for k in range(way.shape[1] - 1):
+        time_s = (float(k) + 0.5) * step_s
+        done = float(0.0)
+        wanted = last
+        if time_s >= hears_s:
+            if changed_s < 0.0:
+                changed_s = hears_s + lag_s + wp.length(asked[i] - velocity) / brake
+            done = wp.min((time_s - hears_s) / (changed_s - hears_s + 1.0e-3), 1.0)
+            wanted = wp.where(done < 1.0, asked[i], wp.vec2(0.0, 0.0))
+        change = (wanted - velocity) * wp.min(step_s / wp.max(lag_s, 1.0e-3), 1.0)
+        velocity += change * wp.min(brake * step_s / wp.max(wp.length(change), 1.0e-6), 1.0)
+        place += velocity * step_s
+        way[i, k + 1] = place + done * ahead_m * unit

@@ -21,6 +21,7 @@ _OVER_GAIN = wp.constant(2.0)  # [1/s]
 SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
 _TURNS_M_S2 = wp.constant(2.5)  # how fast a person stops, turns and sets off; guess
 _UNTOLD_S = wp.constant(1.0)  # who was not seen for longer may be anywhere: nothing is reckoned from farther back
+_SOON_S = wp.constant(0.8)  # they are given way to as if they had set off so long ago at most
 _BACK_GAIN = wp.constant(3.0)  # [1/s]
 _BACK_MAX_M_S = wp.constant(4.0)
 
@@ -93,9 +94,11 @@ def closing_max(
     since_s = untold_s + k.reaction_s
     room_m = far_m - level_m(k, over_m) - vel_std * untold_s + sure * k.reaction_s - come_m(since_s)
     left_m = room_m - k.reaction_s * wp.max(wp.dot(own_vel, way) / far_m, 0.0)
-    given = wp.min(sure, 0.0)
+    beside = level_m(k, over_m) / k.owner_m  # [1] nobody over their head has to give way
+    given = beside * wp.min(sure, 0.0)
     if left_m < 0.0:
-        return wp.max(given + _BACK_GAIN * left_m, -_BACK_MAX_M_S)
+        likely_m = left_m + come_m(since_s) - come_m(wp.min(since_s, _SOON_S))
+        return wp.max(given + beside * _BACK_GAIN * wp.min(likely_m, 0.0), -_BACK_MAX_M_S)
     both = k.brake + _TURNS_M_S2
     losing = _TURNS_M_S2 * since_s - wp.max(sure, 0.0)
     steady_s = braking_s(room_m, losing + k.brake * k.reaction_s, both)  # at the speed that is asked for
