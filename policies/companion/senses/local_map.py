@@ -28,6 +28,9 @@ _ALIVE = 0.05  # fraction of pixels with depth below which there is none
 _UNSEEN = -(10**15)
 _OWN_M = 0.75  # so near nothing is seen: what is not known to be solid is taken to be free,
 _HULL_M = 0.35  # and where the vehicle itself is, nothing else is
+_FAN = 240  # directions all round in which a picture shows what is free: about a column each
+_FAN_RAD = 2.0 * np.pi / _FAN
+_FAN_UNITS = np.stack([np.cos((np.arange(_FAN) + 0.5) * _FAN_RAD), np.sin((np.arange(_FAN) + 0.5) * _FAN_RAD)], -1)
 _RAYS = 5  # of a sector of ranges: a cell apart at the edge of what is asked for
 
 Floats = NDArray[np.float64]
@@ -69,7 +72,7 @@ class LocalMap:
         here = np.array(pose.pos_ned[:2])
         level_m = np.hypot(points[..., 0], points[..., 1])
         is_there = is_return & (points[..., 2] > -_ABOVE_M) & (points[..., 2] < _BELOW_M)
-        self._carve(here, rays_ned, np.where(is_there, level_m, np.inf).min(0), now_us)
+        self._carve(here, rays_ned, np.where(is_there, level_m, np.inf), now_us)
         is_solid = is_there & (level_m < REACH_M)
         if owner is not None:
             off = points[..., :2] + here - owner[0][:2]
@@ -79,10 +82,20 @@ class LocalMap:
         self._solid_us[rows, columns] = now_us
 
     def _carve(self, here: Floats, rays_ned: Floats, first_m: Floats, now_us: int) -> None:
-        """Notes as free what lies before the first thing in each column, a body too: what it hides is unknown."""
-        level = rays_ned[IMAGE_SIZE // 2, :, :2]
-        units = level / np.hypot(level[:, 0], level[:, 1])[:, None]
-        self._open(here, units, np.where(np.isfinite(first_m), first_m - CELL_M, _NO_RETURN_M), now_us)
+        """Notes as free what lies before the first thing in each direction, a body too: what it hides is unknown.
+
+        However the vehicle leans, a direction counts if some ray of it stays in the slice for as far as that.
+        """
+        rays = rays_ned.reshape(-1, 3)
+        slope = rays[:, 2] / np.maximum(np.hypot(rays[:, 0], rays[:, 1]), 1e-6)
+        sectors = np.floor(np.arctan2(rays[:, 1], rays[:, 0]) / _FAN_RAD).astype(np.int64) % _FAN
+        nearest_m = np.full(_FAN, np.inf)
+        np.minimum.at(nearest_m, sectors, first_m.reshape(-1))
+        is_level = (slope > -_ABOVE_M / _NO_RETURN_M) & (slope < _BELOW_M / _NO_RETURN_M)
+        is_seen = np.bincount(sectors[is_level], minlength=_FAN) > 0
+        units = _FAN_UNITS[is_seen]
+        free_m = np.where(np.isfinite(nearest_m), nearest_m - CELL_M, _NO_RETURN_M)[is_seen]
+        self._open(here, units, free_m, now_us)
 
     def _open_ahead(self, place: Floats, velocity: Floats, now_us: int) -> None:
         """Notes as free, but for what is known to be solid, where somebody walks: they look where they go."""
