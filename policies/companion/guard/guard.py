@@ -7,7 +7,7 @@ end.
 
 from collections import Counter
 from enum import Enum
-from math import atan2, isfinite
+from math import atan2, inf, isfinite
 
 import numpy as np
 import warp as wp
@@ -29,7 +29,7 @@ _SEARCH_PERIOD_S = 15.0  # of a search towards the phone: at first it looks ther
 _SEARCH_FACES_S = 4.0  # and then round it
 _THERE_M = 2.0  # so near the stand-off it looks round
 _RISEN_US = 2_000_000  # for so long it stays over the owner
-_AGES_S = 60.0  # silence that is no number is so long
+_SILENCE_MAX_S = 60.0  # silence that is no number is so long
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 
 
@@ -95,8 +95,8 @@ class Guard:
             level, down = scale * level, scale * down
             yaw_rate = self._facing_owner(own, yaw_rate)
             self.interventions[self.stance.value] += 1
-        level, owner = self._past_owner(level, own)
-        level = self._flown = self._past_solids(level, own, owner)
+        level, people = self._past_people(level, own)
+        level = self._flown = self._past_solids(level, own, people)
         down = self._within_heights(down, own)
         return (float(level[0]), float(level[1]), float(down)), yaw_rate
 
@@ -146,32 +146,32 @@ class Guard:
         error = wrapped(bearing_rad - yaw_of(own.q_ned_from_frd))
         return float(np.clip(_FACE_GAIN * error, -_YAW_MAX, _YAW_MAX))
 
-    def _past_owner(self, level: Floats, own: Own) -> tuple[Floats, Somebody | None]:
-        """The velocity without what brings it too near to the owner, and what it has to do with them."""
-        known, s = self.senses.owner_now(own), self.settings
-        self._is_too_near = False
-        if known is None:
-            return level, None
-        way = known.pos_ned[:2] - np.array(own.pos_ned[:2])
-        over_m = float(known.pos_ned[2]) - own.pos_ned[2]
-        own_vel, vel = wp.vec2(*own.vel_ned[:2]), wp.vec2(*known.vel)
-        bound = bounds(
-            self._keep_off, wp.vec2(*way), own_vel, vel, known.vel_std(way), min(known.silence_s, _AGES_S), over_m
-        )
-        self._is_too_near = bound.then_m < s.owner_m
-        self._sinking_max = bound.sinking_max
-        owner = Somebody(way / max(float(np.hypot(*way)), 1e-3), bound.closing_max, bound.then_m < s.pressed_m)
-        kept = np.array(kept_off(wp.vec2(*level), wp.vec2(*way), bound.closing_max))
-        self._count("near the owner", level, kept)
-        return kept, owner
+    def _past_people(self, level: Floats, own: Own) -> tuple[Floats, list[Somebody]]:
+        """The velocity without what brings it too near to anybody who was seen, and what it has to do with them."""
+        self._is_too_near, self._sinking_max = False, inf
+        owner, people = self.senses.owner_now(own), self.senses.others_now(own)
+        kept, near = level, []
+        for known in people if owner is None else [owner, *people]:
+            way = known.pos_ned[:2] - np.array(own.pos_ned[:2])
+            over_m = float(known.pos_ned[2]) - own.pos_ned[2]
+            own_vel, vel = wp.vec2(*own.vel_ned[:2]), wp.vec2(*known.vel)
+            silence_s = min(known.silence_s, _SILENCE_MAX_S)
+            bound = bounds(self._keep_off, wp.vec2(*way), own_vel, vel, known.vel_std(way), silence_s, over_m)
+            if bound.then_m < self.settings.owner_m:
+                self._is_too_near, self._sinking_max = True, min(self._sinking_max, bound.sinking_max)
+            unit = way / max(float(np.hypot(*way)), 1e-3)
+            near.append(Somebody(unit, bound.closing_max, bound.then_m < self.settings.pressed_m))
+            kept = np.array(kept_off(wp.vec2(*kept), wp.vec2(*way), bound.closing_max))
+        self._count("near somebody", level, kept)
+        return kept, near
 
-    def _past_solids(self, level: Floats, own: Own, owner: Somebody | None) -> Floats:
+    def _past_solids(self, level: Floats, own: Own, people: list[Somebody]) -> Floats:
         s, around = self.settings, self.senses.map
         slower = level
         if not around.has_depth:
             slower = level * min(1.0, s.no_depth_speed / max(float(np.hypot(*level)), 1e-6))
             self._count("no depth", level, slower)
-        kept = clear_velocity(slower, self._flown, own, around, s, owner)
+        kept = clear_velocity(slower, self._flown, own, around, s, people)
         self._count("near something", slower, kept)
         return kept
 
@@ -184,6 +184,9 @@ class Guard:
                 return self._sinking_max
         if own.boot_us - self._risen_us < _RISEN_US:  # they may be right below, where it cannot see them
             down = min(down, 0.0)
+        room_m = self.senses.map.room_up_m(own.pos_ned, own.boot_us) - s.crown_m
+        if isfinite(room_m):
+            down = max(down, -stopping_speed(room_m, s.reaction_s, CLIMB_M_S))
         return within_heights(down, own.range_m, s)
 
     def _count(self, why: str, wanted: Floats, kept: Floats) -> None:

@@ -5,6 +5,7 @@ braking to a stand from there, all level. It answers with a lag, and no faster t
 to have. What is clear is so from the first sample to the last: whoever takes one of them can go on taking it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from typing import Any
@@ -47,7 +48,7 @@ class Somebody:
 
 
 def clear_velocity(
-    wanted: Floats, last: Floats, own: Own, around: LocalMap, s: GuardSettings, person: Somebody | None = None
+    wanted: Floats, last: Floats, own: Own, around: LocalMap, s: GuardSettings, people: Sequence[Somebody] = ()
 ) -> Floats:
     """The level velocity nearest to the wanted one [m/s] whose rollout is clear; if none is, the one farthest off.
 
@@ -57,7 +58,7 @@ def clear_velocity(
         own: telemetry.
         around: what is known.
         s: of the guard.
-        person: who is kept off besides; the wanted velocity does so.
+        people: who are kept off besides; the wanted velocity does so, as far as it can be.
     """
     asked = _candidates(wanted, last, s.unseen_speed)
     own_vel = np.array(own.vel_ned[:2])
@@ -65,13 +66,15 @@ def clear_velocity(
     near_m, is_seen = around.room(points, own.pos_ned, own.boot_us)
     here_m = float(near_m[0, 0])
     may_be_unseen = np.hypot(asked[:, 0], asked[:, 1]) <= s.unseen_speed + 1e-6
-    if person is not None and person.is_pressing:
-        may_be_unseen |= asked @ person.way < 0.0
+    is_allowed = np.ones(len(asked), bool)
+    for person in people:
+        is_allowed &= asked @ person.way <= person.closing_max + 1e-6
+        if person.is_pressing:
+            may_be_unseen |= asked @ person.way < 0.0
     is_blocked = (near_m < _room_m(here_m, s.solid_m)) | ~(is_seen | may_be_unseen[:, None])
     is_clear = ~is_blocked.any(1)
     answered = 1 + round(s.reaction_s / _STEP_S)
     least_m = np.where(is_seen | may_be_unseen[:, None], near_m, 0.0)[:, answered:].min(1)
-    is_allowed = np.ones(len(asked), bool) if person is None else asked @ person.way <= person.closing_max + 1e-6
     speed, wanted_speed = np.hypot(*asked.T), float(np.hypot(*wanted))
     is_that_way = asked @ wanted > _THAT_WAY * speed * wanted_speed
     slower = wanted_speed - np.where(is_that_way, np.minimum(speed, wanted_speed), 0.0)
@@ -80,6 +83,8 @@ def clear_velocity(
     cost += _GRAZING * np.maximum(s.solid_m + _SLACK_M - least_m, 0.0)
     if (is_clear & is_allowed).any():
         return np.asarray(asked[int(np.argmin(np.where(is_clear & is_allowed, cost, np.inf)))])
+    if not is_allowed.any():  # between people
+        return np.zeros(2)
     return np.asarray(asked[int(np.argmax(np.where(is_allowed, least_m - 1e-3 * speed, -np.inf)))])
 
 
@@ -91,15 +96,16 @@ def _room_m(here_m: float, solid_m: float) -> float:
 
 
 def _candidates(wanted: Floats, last: Floats, unseen_speed: float) -> Floats:
-    """The wanted velocity, that of before, the wanted one turned and slower, and none; shape (candidates, 2)."""
+    """The wanted velocity, that of before, the wanted one turned and slower, slowly anywhere, and none."""
     cos, sin = np.cos(_TURNS), np.sin(_TURNS)
     north, east = wanted
     turned = np.stack([cos * north - sin * east, sin * north + cos * east], -1)
     speed = max(float(np.hypot(*wanted)), 1e-6)
     creeping = min(unseen_speed / speed, 1.0)
     slower = np.concatenate([fraction * turned for fraction in (*_FRACTIONS, creeping)])
+    away = unseen_speed * np.stack([cos, sin], -1)
     before = last * min(1.0, speed / max(float(np.hypot(*last)), 1e-6))
-    return np.concatenate([wanted[None], before[None], slower, np.zeros((1, 2))])
+    return np.concatenate([wanted[None], before[None], slower, away, np.zeros((1, 2))])
 
 
 def _rolled(asked: Floats, own: Floats, last: Floats, s: GuardSettings) -> Floats:

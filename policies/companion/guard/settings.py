@@ -50,7 +50,7 @@ class GuardSettings(BaseModel):
     """... and before what does not move."""
     reaction_s: float = Field(default=REACTION_S, ge=0.0)
     """From a setpoint to the motion, besides the age of the picture; measured."""
-    solid_m: float = Field(default=0.6, gt=0.0)
+    solid_m: float = Field(default=0.7, gt=0.0)
     """From the vehicle's middle to that of a solid cell of the map: it reaches to 0.4 m, half a cell to 0.18 m."""
     unseen_speed: float = Field(default=0.6, ge=0.0)
     """[m/s] to where nothing is known."""
@@ -58,8 +58,8 @@ class GuardSettings(BaseModel):
     """[m/s] without depth."""
     height_min_m: float = Field(default=1.0, ge=0.0)
     """Above the ground: below it climbs."""
-    height_max_m: float = Field(default=4.0, gt=0.0)
-    """Above the ground: higher it does not climb; crowns begin there."""
+    height_max_m: float = Field(default=3.5, gt=0.0)
+    """Above the ground: higher it does not climb; crowns begin soon after."""
     speed_max: float = Field(default=7.5, gt=0.0)
     """[m/s] level, of whoever goes to goals; policies ask for 7."""
     scan_slow_s: float = Field(default=0.4, gt=0.0)
@@ -71,7 +71,7 @@ class GuardSettings(BaseModel):
     dark_stop_s: float = Field(default=2.0, gt=0.0)
     """... and after so long it stands, if its beams should see the ground."""
     crown_m: float = Field(default=0.8, gt=0.0)
-    """It stays so far below what the beams that look up see."""
+    """It stays so far below what it has seen overhead."""
     goal_reaction_s: float = Field(default=0.2, ge=0.0)
     """From a setpoint to the motion of whoever goes to goals, besides the age of the ranges; measured: 0.17 s."""
     goal_solid_m: float = Field(default=0.5, gt=0.0)

@@ -4,7 +4,7 @@ In: depth pictures or sectors of ranges, with the pose each was taken at. Out: h
 What has not been seen is not free.
 """
 
-from math import hypot
+from math import hypot, inf
 
 import cv2
 import numpy as np
@@ -24,6 +24,7 @@ _NO_RETURN_M = 4.0  # so far a column without any return is taken to be free, if
 _HOLD_US = 6_000_000  # for so long what was seen counts
 _OWNER_M = 0.6  # round the owner, who is no part of the map; they pass trees at 0.6 m from their middle
 _LEAD_S = 1.0  # nobody runs into what they reach in so long; guess
+_TOP_M = 0.3  # what is farther up than this is over the vehicle
 _ALIVE = 0.05  # fraction of pixels with depth below which there is none
 _UNSEEN = -(10**15)
 _OWN_M = 0.75  # so near nothing is seen: what is not known to be solid is taken to be free,
@@ -42,6 +43,8 @@ class LocalMap:
     def __init__(self) -> None:
         self._free_us = np.full((CELLS, CELLS), _UNSEEN, np.int64)
         self._solid_us = np.full((CELLS, CELLS), _UNSEEN, np.int64)
+        self._over = np.full((CELLS, CELLS), -np.inf)  # [m] down, of the lowest that was seen over it
+        self._over_us = np.full((CELLS, CELLS), _UNSEEN, np.int64)
         self._corner = (0, 0)  # cell indices of the grid's first cell
         self.has_depth = False
         """The last picture had depth, the last scan a return."""
@@ -73,6 +76,7 @@ class LocalMap:
         level_m = np.hypot(points[..., 0], points[..., 1])
         is_there = is_return & (points[..., 2] > -_ABOVE_M) & (points[..., 2] < _BELOW_M)
         self._carve(here, rays_ned, np.where(is_there, level_m, np.inf), now_us)
+        self._look_up(points[is_return & (points[..., 2] < -_TOP_M) & (level_m < REACH_M)] + pose.pos_ned, now_us)
         is_solid = is_there & (level_m < REACH_M)
         if owner is not None:
             off = points[..., :2] + here - owner[0][:2]
@@ -80,6 +84,21 @@ class LocalMap:
             self._open_ahead(*owner, now_us)
         rows, columns = self._cells(points[..., :2][is_solid] + here)
         self._solid_us[rows, columns] = now_us
+
+    def _look_up(self, points: Floats, now_us: int) -> None:
+        """Notes what lies overhead, ned."""
+        rows, columns = self._cells(points[:, :2])
+        old = self._over_us[rows, columns] <= now_us - _HOLD_US
+        self._over[rows[old], columns[old]] = -np.inf
+        np.maximum.at(self._over, (rows, columns), points[:, 2])
+        self._over_us[rows, columns] = now_us
+
+    def room_up_m(self, pos_ned: Vector, now_us: int) -> float:
+        """How far up it is [m] to the lowest of what was seen over where the vehicle is; inf: to nothing."""
+        rows, columns = self._cells(np.array(pos_ned[:2]) + self._own)
+        over = np.where(self._over_us[rows, columns] > now_us - _HOLD_US, self._over[rows, columns], -np.inf)
+        over = over[over < pos_ned[2]]
+        return pos_ned[2] - float(over.max()) if len(over) else inf
 
     def _carve(self, here: Floats, rays_ned: Floats, first_m: Floats, now_us: int) -> None:
         """Notes as free what lies before the first thing in each direction, a body too: what it hides is unknown.
@@ -200,7 +219,7 @@ class LocalMap:
                 continue
             start = self._corner[axis] + (CELLS if moved > 0 else moved)
             lines = np.arange(start, start + abs(moved))[:CELLS] % CELLS
-            for grid in (self._free_us, self._solid_us):
+            for grid in (self._free_us, self._solid_us, self._over_us):
                 np.moveaxis(grid, axis, 0)[lines] = _UNSEEN
         self._corner = (corner[0], corner[1])
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from policies.companion.senses.poses import Pose
-from policies.companion.senses.seen_owner import SeenOwner
+from policies.companion.senses.seen_owner import PersonNow, SeenOwner
 
 Floats = NDArray[np.float64]
 _MAX = 6
@@ -21,6 +21,7 @@ _FAVOUR_M = 0.25  # so much farther off the owner is still the likelier
 _LATELY_US = 600_000
 _TOGETHER_US = 300_000  # who was there so long before the owner went is not the owner
 _WALKS_M = 1.0
+_SIGHTS, _WALK_M_S = 4, 0.7  # from so many on, faster than this, somebody is surely on their way
 _MET_M = 2.5  # nearer to the owner somebody may be taken for them
 _OWNER = -1
 
@@ -84,6 +85,11 @@ class OtherPeople:
     def places(self, time_us: int) -> list[Floats]:
         """Where they are [m], of those who were seen lately, in order."""
         return [one.person.now(time_us)[0] for one in self._lately(time_us)]
+
+    def now(self, time_us: int) -> list[PersonNow]:
+        """What is known of those who were seen lately and walk: whom a trunk is taken for does not."""
+        known = [one.person.person_now(time_us) for one in self._lately(time_us) if one.person.sights >= _SIGHTS]
+        return [person for person in known if float(np.hypot(*person.vel)) > _WALK_M_S]
 
     def exchange(self, index: int, owner: SeenOwner, time_us: int) -> SeenOwner:
         """One of those places is the owner, who was taken for the owner is another; the owner."""

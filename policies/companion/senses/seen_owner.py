@@ -1,5 +1,7 @@
 """Somebody's place and velocity by sights, the owner's first of all, by the filter that policies are trained with."""
 
+from dataclasses import dataclass
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,24 @@ from policies.companion.senses.poses import Pose
 from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, now_rows, see_rows
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class PersonNow:
+    """What is known of somebody by now."""
+
+    pos_ned: Floats
+    """[m] of the chest, (3,)."""
+    vel: Floats
+    """[m/s] north and east."""
+    vel_var: Floats
+    """[m²/s²] its covariance."""
+    silence_s: float
+    """Since they were seen; inf: never."""
+
+    def vel_std(self, way: Floats) -> float:
+        """How uncertain their speed along a level way is [m/s]: one standard deviation."""
+        return sqrt(max(float(way @ self.vel_var @ way), 0.0)) / max(float(np.hypot(*way)), 1e-3)
 
 
 class SeenOwner:
@@ -31,11 +51,14 @@ class SeenOwner:
         self._now = wp.launch(now_rows, 1, [asked, out, velocity], record_cmd=True)
         self.time_us = 0
         """Of the newest sight."""
+        self.sights = 0
+        """So many there were."""
 
     def see(self, place_ned: Floats, pose: Pose, *, has_depth: bool) -> None:
         """An image, newer than the last, shows the owner's chest at a place [m]."""
         self._row["age_s"] = max(pose.time_us - self.time_us, 0) * 1e-6
         self.time_us = pose.time_us
+        self.sights += 1
         self._place[0], self._eye[0] = place_ned, pose.pos_ned
         self._has_depth[0], self._age_s[0] = int(has_depth), 0.0
         self._see.launch()
@@ -52,7 +75,8 @@ class SeenOwner:
         self._now.launch()
         return self._out[0].astype(np.float64), self._velocity[0].astype(np.float64)
 
-    @property
-    def vel_var(self) -> Floats:
-        """Covariance of the velocity at the newest sight [m²/s²], (2, 2)."""
-        return np.asarray(self._row["both"]["vel_var"][0], np.float64)
+    def person_now(self, time_us: int) -> PersonNow:
+        """What is known of them at a time."""
+        place, velocity = self.now(time_us)
+        var = np.asarray(self._row["both"]["vel_var"][0], np.float64)
+        return PersonNow(place, velocity, var, max(time_us - self.time_us, 0) * 1e-6)

@@ -5,8 +5,7 @@ phone together, since when the owner has not been seen, and a level map of what 
 detector sees where they are expected; after a while without them, only who is there in several images in a row.
 """
 
-from dataclasses import dataclass
-from math import atan2, inf, isfinite, sqrt
+from math import atan2, inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from policies.companion.senses.local_map import LocalMap
 from policies.companion.senses.other_people import OtherPeople
 from policies.companion.senses.phone_check import PhoneCheck, Word
 from policies.companion.senses.poses import Pose, PoseHistory
-from policies.companion.senses.seen_owner import SeenOwner
+from policies.companion.senses.seen_owner import PersonNow, SeenOwner
 from policies.companion.vehicle_link import Own, Owner
 from policies.person_detector.detector import Detection, PersonDetector
 
@@ -38,24 +37,6 @@ _STRANGE_S = 4.0  # and after so long anybody may be them
 _NEW_US = 1_000_000  # after so long with somebody in sight they are the owner, if nobody was so before
 _IN_A_ROW = 4  # as many images must show them, one beside the other
 _BESIDE_M = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class OwnerNow:
-    """What is known of the owner."""
-
-    pos_ned: Floats
-    """[m] of the chest, (3,)."""
-    vel: Floats
-    """[m/s] north and east."""
-    vel_var: Floats
-    """[m²/s²] its covariance."""
-    silence_s: float
-    """Since they were seen; inf: never."""
-
-    def vel_std(self, way: Floats) -> float:
-        """How uncertain their speed along a level way is [m/s]: one standard deviation."""
-        return sqrt(max(float(way @ self.vel_var @ way), 0.0)) / max(float(np.hypot(*way)), 1e-3)
 
 
 class Senses:
@@ -153,17 +134,20 @@ class Senses:
         """The phone has spoken not long ago."""
         return self.heard_us is not None and self._boot_us - self.heard_us < PHONE_OLD_S * 1e6
 
-    def owner_now(self, own: Own) -> OwnerNow | None:
+    def owner_now(self, own: Own) -> PersonNow | None:
         """Where the owner is: by sights, or if those are old by the phone too; None: nobody knows."""
         silence_s = self.silence_s(own)
         if silence_s < _GONE_S:
-            place, level = self.seen.now(own.boot_us)
-            return OwnerNow(place, level, self.seen.vel_var, silence_s)
+            return self.seen.person_now(own.boot_us)
         track = self.watch.track
         if track is None or not track.is_known:
             return None
         place = track.pos_ned + max(own.boot_us - track.time_us, 0) * 1e-6 * track.vel_ned
-        return OwnerNow(place, track.vel_ned[:2], track.vel_cov[:2, :2], silence_s)
+        return PersonNow(place, track.vel_ned[:2], track.vel_cov[:2, :2], silence_s)
+
+    def others_now(self, own: Own) -> list[PersonNow]:
+        """Where people are who were seen and not taken for the owner: one of them may be."""
+        return self._others.now(own.boot_us)
 
     def _owner_then(self, time_us: int, own: Own) -> tuple[Floats, Floats] | None:
         """Where the owner was when an image was taken, and how fast; None: nobody knows."""

@@ -12,18 +12,20 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-OWNER_M = 1.0  # [m] to the middle of the person: it comes no nearer
+OWNER_M = 1.15  # [m] to the middle of the person: it comes no nearer
 OWNER_BRAKE_M_S2 = 3.5  # with which the vehicle is taken to brake before them; measured on the x500: 3.0 to 3.5
 REACTION_S = 0.35  # from a setpoint to the motion, besides the age of the picture; measured on the x500
-ESCAPE_CLIMB_M_S = 1.5  # nearer than allowed, until it is over their head
+ESCAPE_CLIMB_M_S = 2.5  # nearer than allowed, until it is over their head
 _OVER_M = wp.constant(1.45)  # so far above their chest it is
 _OVER_GAIN = wp.constant(2.0)  # [1/s]
 SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
 _TURNS_M_S2 = wp.constant(2.5)  # how fast a person stops, turns and sets off; guess
 _UNTOLD_S = wp.constant(1.0)  # who was not seen for longer may be anywhere: nothing is reckoned from farther back
+_TOLD_S = wp.constant(0.25)  # from the first picture of who sets off until their velocity tells it; measured,
+_LEAVES_M_S = wp.constant(2.0)  # of who does not leave as fast as this: they would have to stop before
 _SOON_S = wp.constant(0.8)  # they are given way to as if they had set off so long ago at most
-_BACK_GAIN = wp.constant(3.0)  # [1/s]
-_BACK_MAX_M_S = wp.constant(4.0)
+_BACK_GAIN = wp.constant(5.0)  # [1/s]
+_BACK_MAX_M_S = wp.constant(5.0)
 
 
 @wp.struct
@@ -91,7 +93,7 @@ def closing_max(
     leaving = wp.dot(other_vel, way) / far_m
     sure = wp.max(leaving - vel_std, wp.min(leaving, 0.0))
     untold_s = wp.min(age_s, _UNTOLD_S)
-    since_s = untold_s + k.reaction_s
+    since_s = untold_s + k.reaction_s + _TOLD_S * (1.0 - wp.clamp(leaving / _LEAVES_M_S, 0.0, 1.0))
     room_m = far_m - level_m(k, over_m) - vel_std * untold_s + sure * k.reaction_s - come_m(since_s)
     left_m = room_m - k.reaction_s * wp.max(wp.dot(own_vel, way) / far_m, 0.0)
     beside = level_m(k, over_m) / k.owner_m  # [1] nobody over their head has to give way

@@ -49,7 +49,7 @@ def test_where_nothing_has_been_seen_it_creeps() -> None:
 
 def test_who_is_pressed_goes_back_to_where_it_has_not_looked() -> None:
     back, still = np.array([-2.0, 0.0]), np.zeros(2)
-    pressing = Somebody(np.array([1.0, 0.0]), -2.0, is_pressing=True)
+    pressing = [Somebody(np.array([1.0, 0.0]), -2.0, is_pressing=True)]
     kept = clear_velocity(back, still, own_at(still, still), LocalMap(), S, pressing)
     assert kept == pytest.approx(back)
 
@@ -72,7 +72,7 @@ def test_who_flies_at_a_trunk_goes_round_it_or_stands_and_never_nearer_to_somebo
     wanted, pos, vel = np.array([speed, 0.0]), np.zeros(2), np.zeros(2)
     asked, lag_s = [np.zeros(2)], S.reaction_s - step_s
     for _ in range(60):
-        asked.append(clear_velocity(wanted, asked[-1], own_at(pos, vel), around(trunk, pos), S, person))
+        asked.append(clear_velocity(wanted, asked[-1], own_at(pos, vel), around(trunk, pos), S, [person]))
         assert float(asked[-1] @ person.way) <= person.closing_max + 1e-5
         change = asked.pop(0) - vel
         vel = vel + change * min(step_s / lag_s, S.brake * step_s / max(float(np.hypot(*change)), 1e-6))

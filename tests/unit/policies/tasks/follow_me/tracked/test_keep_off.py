@@ -23,7 +23,7 @@ _DT_S = 0.01
 
 def most(far_m: float, own: float = 0.0, leaving: float = 0.0, age_s: float = 0.0, over_m: float = 0.0) -> float:
     """How fast it may close [m/s] with somebody ahead."""
-    return float(closing_max(RULE, wp.vec2(far_m, 0.0), wp.vec2(own, 0.0), wp.vec2(leaving, 0.0), age_s, over_m))
+    return float(closing_max(RULE, wp.vec2(far_m, 0.0), wp.vec2(own, 0.0), wp.vec2(leaving, 0.0), 0.0, age_s, over_m))
 
 
 def nearest_m(speed: float, age_s: float, start_m: float) -> float:
@@ -67,7 +67,7 @@ def test_full_speed_at_somebody_who_stands_ends_before_them() -> None:
 
 def test_going_past_somebody_is_let_be() -> None:
     past, way = wp.vec2(0.0, 3.0), wp.vec2(2.0, 0.0)
-    most_m_s = closing_max(RULE, way, past, wp.vec2(0.0, 0.0), 0.0, 0.0)
+    most_m_s = closing_max(RULE, way, past, wp.vec2(0.0, 0.0), 0.0, 0.0, 0.0)
     assert tuple(kept_off(past, way, most_m_s)) == pytest.approx((0.0, 3.0))
 
 
@@ -106,5 +106,5 @@ def test_what_it_takes_off_is_only_what_brings_it_nearer() -> None:
 
 
 def test_the_distance_then_is_less_by_what_both_do_meanwhile() -> None:
-    then_m = float(distance_then(wp.vec2(3.0, 0.0), wp.vec2(2.0, 0.0), wp.vec2(0.0, 0.0), 0.5))
-    assert then_m == pytest.approx(3.0 - 0.5 * 2.0 - 0.5 * _STOPS_M_S2 * 0.25)
+    then_m = float(distance_then(wp.vec2(3.0, 0.0), wp.vec2(2.0, 0.0), wp.vec2(0.0, 0.0), 0.5, 0.2))
+    assert then_m == pytest.approx(3.0 - 0.5 * 2.0 - 0.5 * _STOPS_M_S2 * 0.49)
