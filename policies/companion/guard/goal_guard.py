@@ -60,7 +60,8 @@ class GoalGuard:
 
     def __init__(self, settings: GuardSettings, *, drives: bool) -> None:
         brake = settings.drive_brake if drives else settings.brake
-        update = {"brake": brake, "reaction_s": settings.goal_reaction_s, "solid_m": settings.goal_solid_m}
+        update = {"brake": brake, "solid_m": settings.goal_solid_m}
+        update |= dict.fromkeys(("reaction_s", "hears_s"), settings.goal_reaction_s)
         self.settings = settings.model_copy(update=update)
         self._drives = drives
         self.stance = GoalStance.FREE

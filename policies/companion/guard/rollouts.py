@@ -25,7 +25,6 @@ Floats = NDArray[np.float64]
 _FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the speed that is wanted
 _TURNS = np.arange(-17, 19) * (np.pi / 18.0)
 _STEP_S, _STEPS = 0.05, 90  # coarser, it would pass over a trunk
-_HEARS_S = 0.1  # the part of a reaction in which nothing of a new velocity is seen: a decision; the rest is lag
 _NEARER_M = 0.1  # who is too near already may come so much nearer on the way out,
 _NEAREST_M = 0.1  # but by no more than this too near
 _STEADY = 0.3  # how much what was flown last counts beside what is wanted: not left, right and left again
@@ -112,7 +111,7 @@ def _rolled(asked: Floats, own: Floats, last: Floats, s: GuardSettings) -> Float
     """Where each candidate leads from here [m], and so far ahead of it; shape (candidates, _STEPS + 1, 2)."""
     start_warp()
     way = wp.zeros((len(asked), _STEPS + 1), dtype=wp.vec2)
-    hears_s = min(_HEARS_S, s.reaction_s)
+    hears_s = min(s.hears_s, s.reaction_s)
     inputs: list[Any] = [wp.array(asked, dtype=wp.vec2), wp.vec2(*own), wp.vec2(*last), hears_s]
     wp.launch(roll, len(asked), [*inputs, s.reaction_s - hears_s, s.brake, s.solid_m, _STEP_S, way])
     return np.asarray(way.numpy(), np.float64)
