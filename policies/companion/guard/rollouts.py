@@ -7,7 +7,6 @@ to have. What is clear is so from the first sample to the last: whoever takes on
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-
 from typing import Any
 
 import numpy as np
@@ -18,8 +17,7 @@ from common.warp_start import start_warp
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.local_map import LocalMap
 from policies.companion.vehicle_link import Own
-
-wp.set_module_options({"enable_backward": False})
+from policies.tasks.flight.rollout import roll
 
 Floats = NDArray[np.float64]
 _FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the speed that is wanted
@@ -59,11 +57,10 @@ def clear_velocity(
         s: of the guard.
         people: who are kept off besides; the wanted velocity does so, as far as it can be.
     """
-    asked = _candidates(wanted, last, s.unseen_speed)
-    own_vel = np.array(own.vel_ned[:2])
-    points = np.array(own.pos_ned[:2]) + _rolled(asked, own_vel, last, s)
-    near_m, is_seen = around.room(points, own.pos_ned, own.boot_us)
-    here_m = float(near_m[0, 0])
+    here = np.array(own.pos_ned[:2])
+    here_m = float(around.room(here, own.pos_ned, own.boot_us)[0])
+    asked = _candidates(wanted, last, s.unseen_speed, is_too_near=here_m < s.solid_m)
+    near_m, is_seen = around.room(here + _rolled(asked, np.array(own.vel_ned[:2]), last, s), own.pos_ned, own.boot_us)
     may_be_unseen = np.hypot(asked[:, 0], asked[:, 1]) <= s.unseen_speed + 1e-6
     is_allowed = np.ones(len(asked), bool)
     for person in people:
@@ -94,15 +91,15 @@ def _room_m(here_m: float, solid_m: float) -> float:
     return max(here_m - _NEARER_M, min(here_m, solid_m - _NEAREST_M))
 
 
-def _candidates(wanted: Floats, last: Floats, unseen_speed: float) -> Floats:
-    """The wanted velocity, that of before, the wanted one turned and slower, slowly anywhere, and none."""
+def _candidates(wanted: Floats, last: Floats, unseen_speed: float, *, is_too_near: bool) -> Floats:
+    """The wanted velocity, that of before, the wanted one turned and slower, none; who is too near, slowly anywhere."""
     cos, sin = np.cos(_TURNS), np.sin(_TURNS)
     north, east = wanted
     turned = np.stack([cos * north - sin * east, sin * north + cos * east], -1)
     speed = max(float(np.hypot(*wanted)), 1e-6)
     creeping = min(unseen_speed / speed, 1.0)
     slower = np.concatenate([fraction * turned for fraction in (*_FRACTIONS, creeping)])
-    away = unseen_speed * np.stack([cos, sin], -1)
+    away = unseen_speed * np.stack([cos, sin], -1)[: None if is_too_near else 0]
     before = last * min(1.0, speed / max(float(np.hypot(*last)), 1e-6))
     return np.concatenate([wanted[None], before[None], slower, away, np.zeros((1, 2))])
 
@@ -115,36 +112,3 @@ def _rolled(asked: Floats, own: Floats, last: Floats, s: GuardSettings) -> Float
     inputs: list[Any] = [wp.array(asked, dtype=wp.vec2), wp.vec2(*own), wp.vec2(*last), hears_s]
     wp.launch(roll, len(asked), [*inputs, s.reaction_s - hears_s, s.brake, s.solid_m, _STEP_S, way])
     return np.asarray(way.numpy(), np.float64)
-
-
-@wp.kernel(enable_backward=False)
-def roll(
-    asked: wp.array(dtype=wp.vec2),
-    own: wp.vec2,
-    last: wp.vec2,
-    hears_s: float,
-    lag_s: float,
-    brake: float,
-    ahead_m: float,
-    step_s: float,
-    way: wp.array2d(dtype=wp.vec2),
-) -> None:
-    """One candidate's rollout."""
-    i = wp.tid()
-    unit = asked[i] / wp.max(wp.length(asked[i]), 1.0e-6)
-    velocity = own
-    place = wp.vec2(0.0, 0.0)
-    changed_s = float(-1.0)  # when it has the velocity that it is asked for
-    for k in range(way.shape[1] - 1):
-        time_s = (float(k) + 0.5) * step_s
-        done = float(0.0)
-        wanted = last
-        if time_s >= hears_s:
-            if changed_s < 0.0:
-                changed_s = hears_s + lag_s + wp.length(asked[i] - velocity) / brake
-            done = wp.min((time_s - hears_s) / (changed_s - hears_s + 1.0e-3), 1.0)
-            wanted = wp.where(done < 1.0, asked[i], wp.vec2(0.0, 0.0))
-        change = (wanted - velocity) * wp.min(step_s / wp.max(lag_s, 1.0e-3), 1.0)
-        velocity += change * wp.min(brake * step_s / wp.max(wp.length(change), 1.0e-6), 1.0)
-        place += velocity * step_s
-        way[i, k + 1] = place + done * ahead_m * unit

@@ -99,7 +99,7 @@ def closing_max(
     beside = level_m(k, over_m) / k.owner_m  # [1] nobody over their head has to give way
     given = beside * wp.min(sure, 0.0)
     if left_m < 0.0:
-        likely_m = left_m + come_m(since_s) - come_m(wp.min(since_s, _SOON_S))
+        likely_m = left_m + vel_std * untold_s + come_m(since_s) - come_m(wp.min(since_s, _SOON_S))
         return wp.max(given + beside * _BACK_GAIN * wp.min(likely_m, 0.0), -_BACK_MAX_M_S)
     both = k.brake + _TURNS_M_S2
     losing = _TURNS_M_S2 * since_s - wp.max(sure, 0.0)
