@@ -21,7 +21,8 @@ ROOM_M = 1.0  # more room about a place is not told
 REACH_M = 10.0  # farther nothing is asked for
 _ABOVE_M, _BELOW_M = 0.7, 0.4  # of the slice that the vehicle flies through; guess: its own height twice
 _NO_RETURN_M = 4.0  # so far a column without any return is taken to be free, if others have some; guess
-_HOLD_US = 6_000_000  # for so long what was seen counts
+_HOLD_US = 6_000_000  # for so long what was seen to be free counts, and what was overhead,
+_SOLID_US = 15_000_000  # and so long what was solid: trees stay, while who drifts towards one does not look there
 _OWNER_M = 0.6  # round the owner, who is no part of the map; they pass trees at 0.6 m from their middle
 _LEAD_S = 1.0  # nobody runs into what they reach in so long; guess
 _TOP_M = 0.3  # what is farther up than this is over the vehicle
@@ -120,7 +121,7 @@ class LocalMap:
         """Notes as free, but for what is known to be solid, where somebody walks: they look where they go."""
         along = np.arange(0.0, _LEAD_S + 0.04, 0.04)[:, None, None] * velocity[:2]
         rows, columns = self._cells((place[:2] + along + self._hull).reshape(-1, 2))
-        is_open = self._solid_us[rows, columns] <= now_us - _HOLD_US
+        is_open = self._solid_us[rows, columns] <= now_us - _SOLID_US
         self._free_us[rows[is_open], columns[is_open]] = now_us
 
     def sweep(
@@ -157,7 +158,7 @@ class LocalMap:
             rows, columns = self._cells(seen)
             self._free_us[rows, columns] = now_us
         rows, columns = self._cells(here + self._own)
-        is_solid = self._solid_us[rows, columns] > now_us - _HOLD_US
+        is_solid = self._solid_us[rows, columns] > now_us - _SOLID_US
         self._free_us[rows[~is_solid], columns[~is_solid]] = now_us
 
     def sight(self, pose: Pose, there_ned: Floats, now_us: int) -> None:
@@ -178,7 +179,7 @@ class LocalMap:
         """
         self._follow(pos_ned)
         then = now_us - _HOLD_US
-        is_open = (self._solid_us <= then) | (self._solid_us < self._free_us)
+        is_open = (self._solid_us <= now_us - _SOLID_US) | (self._solid_us < self._free_us)
         first = [-(line % CELLS) for line in self._corner]  # to where its sides do not meet
         unrolled = np.roll(is_open, first, (0, 1)).astype(np.uint8)
         near = CELL_M * cv2.distanceTransform(unrolled, cv2.DIST_L2, cv2.DIST_MASK_PRECISE).astype(np.float64)
@@ -191,7 +192,7 @@ class LocalMap:
     def nearest_m(self, pos_ned: Vector, yaw_rad: float, now_us: int) -> Floats:
         """How near anything known to be solid is in each of SECTORS sectors from the heading clockwise [m]."""
         self._follow(pos_ned)
-        solid = (self._solid_us > now_us - _HOLD_US) & (self._solid_us >= self._free_us)
+        solid = (self._solid_us > now_us - _SOLID_US) & (self._solid_us >= self._free_us)
         rows, columns = np.nonzero(solid)
         out = np.full(SECTORS, np.inf)
         if not len(rows):
