@@ -47,6 +47,8 @@ class FlightConfig(FlightSettings):
     """The origin of the local frame."""
     start_ne_m: tuple[float, float] = (0.0, 0.0)
     """Where the vehicle boots, north and east of it [m]."""
+    start_heading_deg: float = Field(default=0.0, ge=0.0, le=360.0)
+    """Where its nose points then, from north, clockwise."""
     parameters: dict[str, float] = Field(default_factory=dict)
     """Values of the flight controller's parameters that differ from their defaults, by name."""
     world: WorldConfig | WorldFile = WorldConfig()

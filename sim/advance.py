@@ -32,7 +32,7 @@ class RigKernels(NamedTuple):
     Arrays: type
     """Kernel struct: the vehicles, their surroundings and their flight controllers."""
     place: Any
-    """`@wp.kernel (Arrays, is_chosen, start_ne: vec2)`: puts vehicles on the ground, at rest, with a full battery."""
+    """`@wp.kernel (Arrays, is_chosen, start_ne: vec2, heading_rad: float)`: puts vehicles on the ground, at rest, with a full battery."""
     power_on: Any
     """`@wp.kernel (Arrays, is_chosen)`: powers their sensors and flight controllers off and on, wherever they are."""
     forget_impacts: Any
@@ -75,13 +75,13 @@ def rig_kernels(body: Body, law: ControlLaw) -> RigKernels:
     power_autopilot = autopilot_kernels(law).power_on
 
     @wp.kernel(enable_backward=False, module="unique")
-    def place(rig: arrays, is_chosen: wp.array(dtype=int), start_ne: wp.vec2) -> None:
+    def place(rig: arrays, is_chosen: wp.array(dtype=int), start_ne: wp.vec2, heading_rad: float) -> None:
         i = wp.tid()
         if is_chosen[i] == 0:
             return
         model = rig.model[i]
         down = -top_surface(rig.worlds[rig.i_world[i]], start_ne[0], start_ne[1]) - standing_height(model)
-        state = at_rest(model, wp.vec3(start_ne[0], start_ne[1], down), 0.0)
+        state = at_rest(model, wp.vec3(start_ne[0], start_ne[1], down), heading_rad)
         rig.body[i] = state
         rig.truth[i] = truth_of(state)
         rig.wind[i] = WindState()

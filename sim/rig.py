@@ -5,6 +5,7 @@ tasks take `arrays`, whose rows they read, and of which they write setpoints alo
 per thread, for one vehicle or thousands.
 """
 
+from math import radians
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,7 @@ class Rig:
         body: what is moved.
         law: what flies it.
         start_ne_m: north and east of where the vehicles boot [m].
+        heading_deg: where their noses point then, from north, clockwise.
     """
 
     def __init__(
@@ -73,9 +75,10 @@ class Rig:
         body: Body = DEFAULT_BODY,
         law: ControlLaw = DEFAULT_LAW,
         start_ne_m: tuple[float, float] = (0.0, 0.0),
+        heading_deg: float = 0.0,
     ) -> None:
         start_warp()
-        self._start_ne_m = wp.vec2(*start_ne_m)
+        self._start = wp.vec2(*start_ne_m), radians(heading_deg)
         self.body, self.law = body, law
         self._kernels = rig_kernels(body, law)
         self.vehicle_count = vehicle_count
@@ -164,7 +167,7 @@ class Rig:
 
     def place(self, marks: Any) -> None:
         """Puts marked vehicles on the ground where they boot, at rest and with a full battery."""
-        inputs = [self.arrays, marks, self._start_ne_m]
+        inputs = [self.arrays, marks, *self._start]
         wp.launch(self._kernels.place, dim=self.vehicle_count, inputs=inputs, device=self.device)
 
     def power_on(self, marks: Any) -> None:

@@ -99,6 +99,8 @@ class Start(Part):
 
     ne_m: Place = (0.0, 0.0)
     """North, east of home [m]."""
+    heading_deg: float = Field(default=0.0, ge=0.0, le=360.0)
+    """Where its nose points, from north, clockwise."""
     battery: float = Field(default=1.0, ge=0.01, le=1.0)
     """Fraction of its charge."""
 

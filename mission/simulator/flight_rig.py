@@ -51,6 +51,7 @@ def flight_rig(
         body=body,
         law=vehicle.law,
         start_ne_m=config.start_ne_m,
+        heading_deg=config.start_heading_deg,
     )
     rig.prepare(FRAME_TICKS)
     return rig

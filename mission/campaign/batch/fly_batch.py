@@ -118,7 +118,7 @@ def _rig(config: FlightConfig, world: Any, count: int) -> Rig:
     return Rig(
         airframe, world, sensor_model(noise_scale=config.noise, home=config.home),
         flight_wind(config.wind_m_s, config.wind_from_deg), home=config.home, vehicle_count=count, body=body,
-        law=vehicle.law, start_ne_m=config.start_ne_m,
+        law=vehicle.law, start_ne_m=config.start_ne_m, heading_deg=config.start_heading_deg,
     )  # fmt: skip
 
 

@@ -139,6 +139,7 @@ def _own(base: FlightConfig, scenario: Scenario, vehicle: Vehicle) -> FlightConf
             "has_lidar": vehicle.has_lidar,
             "has_base": vehicle.has_base,
             "start_ne_m": vehicle.start.ne_m,
+            "start_heading_deg": vehicle.start.heading_deg,
             "parameters": dict(vehicle.parameters),
             "is_forest": vehicle.policy is not None and (scenario.world.kind in FORESTS or follows_on_wheels),
             "scan_lag_s": 0.0 if vehicle.policy is None else vehicle.policy.scan_lag_s,

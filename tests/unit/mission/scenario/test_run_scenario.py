@@ -219,3 +219,12 @@ def test_a_script_may_go_on_while_the_mission_is_flown():
     ]
     result = flown(script, checks=[{"modes": ["mission", "hold", "land"]}, {"always": "north < 25"}])
     assert result.passed, result.failures
+
+
+@pytest.mark.parametrize("airframe", ["x500", "rover"])
+@pytest.mark.parametrize("heading_deg", [90.0, 225.0])
+def test_its_nose_points_where_the_scenario_says_and_it_knows(airframe, heading_deg):
+    held = f"heading > {heading_deg - 8} and heading < {heading_deg + 8} and heading_error < 8"
+    start, script = {"start": {"heading_deg": heading_deg}}, [{"hold": 4}, {"mark": "on"}, {"hold": 1}]
+    result = flown(vehicle={"airframe": airframe, **start}, script=script, checks=[{"always": held, "from": "on"}])
+    assert result.passed, result.failures
