@@ -29,6 +29,7 @@ _TOP_M = 0.3  # what is farther up than this is over the vehicle
 _ALIVE = 0.05  # fraction of pixels with depth below which there is none
 _UNSEEN = -(10**15)
 _OWN_M = 0.75  # so near nothing is seen: what is not known to be solid is taken to be free,
+_THICK_M = 0.25  # what is seen from one side is at least so thick: trunks are
 _HULL_M = 0.35  # and where the vehicle itself is, nothing else is
 _FAN = 240  # directions all round in which a picture shows what is free: about a column each
 _FAN_RAD = 2.0 * np.pi / _FAN
@@ -83,7 +84,9 @@ class LocalMap:
             off = points[..., :2] + here - owner[0][:2]
             is_solid &= np.hypot(off[..., 0], off[..., 1]) > _OWNER_M
             self._open_ahead(*owner, now_us)
-        rows, columns = self._cells(points[..., :2][is_solid] + here)
+        level, far_m = points[..., :2][is_solid], level_m[is_solid][:, None]
+        behind = level * (1.0 + _THICK_M / np.maximum(far_m, _THICK_M))
+        rows, columns = self._cells(np.concatenate([level, behind]) + here)
         self._solid_us[rows, columns] = now_us
 
     def _look_up(self, points: Floats, now_us: int) -> None:
