@@ -32,7 +32,8 @@ class RigKernels(NamedTuple):
     Arrays: type
     """Kernel struct: the vehicles, their surroundings and their flight controllers."""
     place: Any
-    """`@wp.kernel (Arrays, is_chosen, start_ne: vec2, heading_rad: float)`: puts vehicles on the ground, at rest, with a full battery."""
+    """`@wp.kernel (Arrays, is_chosen, start_ne: vec2, heading_rad: float)`: puts vehicles on the ground, at rest, with
+    a full battery."""
     power_on: Any
     """`@wp.kernel (Arrays, is_chosen)`: powers their sensors and flight controllers off and on, wherever they are."""
     forget_impacts: Any
