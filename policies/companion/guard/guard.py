@@ -157,8 +157,8 @@ class Guard:
             own_vel, vel = wp.vec2(*own.vel_ned[:2]), wp.vec2(*known.vel)
             silence_s = min(known.silence_s, _SILENCE_MAX_S)
             bound = bounds(self._keep_off, wp.vec2(*way), own_vel, vel, known.vel_std(way), silence_s, over_m)
-            if bound.then_m < self.settings.owner_m:
-                self._is_too_near, self._sinking_max = True, min(self._sinking_max, bound.sinking_max)
+            self._is_too_near |= bound.then_m < self.settings.owner_m
+            self._sinking_max = min(self._sinking_max, bound.sinking_max)
             unit = way / max(float(np.hypot(*way)), 1e-3)
             near.append(Somebody(unit, bound.closing_max, bound.then_m < self.settings.pressed_m))
             kept = np.array(kept_off(wp.vec2(*kept), wp.vec2(*way), bound.closing_max))
@@ -184,6 +184,7 @@ class Guard:
                 return self._sinking_max
         if own.boot_us - self._risen_us < _RISEN_US:  # they may be right below, where it cannot see them
             down = min(down, 0.0)
+        down = min(down, self._sinking_max)
         room_m = self.senses.map.room_up_m(own.pos_ned, own.boot_us) - s.crown_m
         if isfinite(room_m):
             down = max(down, -stopping_speed(room_m, s.reaction_s, CLIMB_M_S))

@@ -18,6 +18,9 @@ REACTION_S = 0.35  # from a setpoint to the motion, besides the age of the pictu
 ESCAPE_CLIMB_M_S = 2.5  # nearer than allowed, until it is over their head
 _OVER_M = wp.constant(1.45)  # so far above their chest it is
 _OVER_GAIN = wp.constant(2.0)  # [1/s]
+_HIGH_M = wp.constant(1.0)  # nearer than that it stays so far above their chest, from where it is soon over their head
+_HIGH_WITHIN_M = wp.constant(4.0)
+_RISE_M_S = wp.constant(0.8)
 SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
 _TURNS_M_S2 = wp.constant(2.5)  # how fast a person stops, turns and sets off; guess
 _UNTOLD_S = wp.constant(1.0)  # who was not seen for longer may be anywhere: nothing is reckoned from farther back
@@ -119,6 +122,8 @@ def sinking_max(k: KeepOff, over_m: float, then_m: float) -> float:
     """How fast it may sink [m/s], so far above their chest and so near; negative: it has to climb."""
     if then_m < k.owner_m:
         return wp.max(_OVER_GAIN * (over_m - _OVER_M), -k.escape_climb)
+    if then_m < _HIGH_WITHIN_M:
+        return wp.max(_OVER_GAIN * (over_m - _HIGH_M), -_RISE_M_S)
     return 100.0
 
 
