@@ -28,6 +28,7 @@ _OWNER = (
     "policies.tasks.follow_me.flown_cast",
     "policies.tasks.follow_me.image_way",
     "policies.tasks.follow_me.observe",
+    "policies.tasks.flight.rollout",
     "policies.tasks.follow_me.tracked.owner_filter",
     "policies.tasks.follow_me.tracked.vector",
     "policies.tasks.flight.own_state",

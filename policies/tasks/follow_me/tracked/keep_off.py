@@ -18,13 +18,14 @@ REACTION_S = 0.35  # from a setpoint to the motion, besides the age of the pictu
 ESCAPE_CLIMB_M_S = 2.5  # nearer than allowed, until it is over their head
 _OVER_M = wp.constant(1.45)  # so far above their chest it is
 _OVER_GAIN = wp.constant(2.0)  # [1/s]
-_HIGH_M = wp.constant(1.0)  # nearer than that it stays so far above their chest, from where it is soon over their head
+_LATE_S = wp.constant(0.15)  # with older pictures than this
+_HIGH_M = wp.constant(1.0)  # it stays so far above the chest of who is near, from where it is soon over their head
 _HIGH_WITHIN_M = wp.constant(4.0)
 _RISE_M_S = wp.constant(0.8)
 SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
 _TURNS_M_S2 = wp.constant(2.5)  # how fast a person stops, turns and sets off; guess
 _UNTOLD_S = wp.constant(1.0)  # who was not seen for longer may be anywhere: nothing is reckoned from farther back
-_TOLD_S = wp.constant(0.25)  # from the first picture of who sets off until their velocity tells it; measured,
+_REPORTED_S = wp.constant(0.25)  # from the first picture of who sets off until their velocity tells it; measured,
 _LEAVES_M_S = wp.constant(2.0)  # of who does not leave as fast as this: they would have to stop before
 _SOON_S = wp.constant(0.8)  # they are given way to as if they had set off so long ago at most
 _BACK_GAIN = wp.constant(5.0)  # [1/s]
@@ -96,7 +97,7 @@ def closing_max(
     leaving = wp.dot(other_vel, way) / far_m
     sure = wp.max(leaving - vel_std, wp.min(leaving, 0.0))
     untold_s = wp.min(age_s, _UNTOLD_S)
-    since_s = untold_s + k.reaction_s + _TOLD_S * (1.0 - wp.clamp(leaving / _LEAVES_M_S, 0.0, 1.0))
+    since_s = untold_s + k.reaction_s + _REPORTED_S * (1.0 - wp.clamp(leaving / _LEAVES_M_S, 0.0, 1.0))
     room_m = far_m - level_m(k, over_m) - vel_std * untold_s + sure * k.reaction_s - come_m(since_s)
     left_m = room_m - k.reaction_s * wp.max(wp.dot(own_vel, way) / far_m, 0.0)
     beside = level_m(k, over_m) / k.owner_m  # [1] nobody over their head has to give way
@@ -118,11 +119,11 @@ def kept_off(velocity: wp.vec2, way: wp.vec2, most: float) -> wp.vec2:
 
 
 @wp.func
-def sinking_max(k: KeepOff, over_m: float, then_m: float) -> float:
-    """How fast it may sink [m/s], so far above their chest and so near; negative: it has to climb."""
+def sinking_max(k: KeepOff, over_m: float, then_m: float, age_s: float) -> float:
+    """How fast it may sink [m/s], so far above their chest and so near, seen so long ago; negative: it has to climb."""
     if then_m < k.owner_m:
         return wp.max(_OVER_GAIN * (over_m - _OVER_M), -k.escape_climb)
-    if then_m < _HIGH_WITHIN_M:
+    if then_m < _HIGH_WITHIN_M and age_s > _LATE_S:
         return wp.max(_OVER_GAIN * (over_m - _HIGH_M), -_RISE_M_S)
     return 100.0
 
@@ -144,5 +145,5 @@ def bounds(
     b = Bounds()
     b.closing_max = closing_max(k, way, own_vel, other_vel, vel_std, age_s, over_m)
     b.then_m = distance_then(way, own_vel, other_vel, k.reaction_s, age_s)
-    b.sinking_max = sinking_max(k, over_m, b.then_m)
+    b.sinking_max = sinking_max(k, over_m, b.then_m, age_s)
     return b
