@@ -21,6 +21,7 @@ from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
 from policies.companion.vehicle_link import NEVER_US, Own
 from policies.tasks.follow_me.tracked.keep_off import bounds, keep_off, kept_off
+from policies.tasks.follow_me.tracked.owner_filter import std_along
 
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
@@ -155,8 +156,9 @@ class Guard:
             way = known.pos_ned[:2] - np.array(own.pos_ned[:2])
             over_m = float(known.pos_ned[2]) - own.pos_ned[2]
             own_vel, vel = wp.vec2(*own.vel_ned[:2]), wp.vec2(*known.vel)
+            vel_std = std_along(wp.mat22(*known.vel_var.ravel()), wp.vec2(*way))
             silence_s = min(known.silence_s, _SILENCE_MAX_S)
-            bound = bounds(self._keep_off, wp.vec2(*way), own_vel, vel, known.vel_std(way), silence_s, over_m)
+            bound = bounds(self._keep_off, wp.vec2(*way), own_vel, vel, vel_std, silence_s, over_m)
             self._is_too_near |= bound.then_m < self.settings.owner_m
             self._sinking_max = min(self._sinking_max, bound.sinking_max)
             unit = way / max(float(np.hypot(*way)), 1e-3)
@@ -184,6 +186,8 @@ class Guard:
                 return self._sinking_max
         if own.boot_us - self._risen_us < _RISEN_US:  # they may be right below, where it cannot see them
             down = min(down, 0.0)
+        if down - self._sinking_max > _COUNTED_M_S:
+            self.interventions["over somebody near"] += 1
         down = min(down, self._sinking_max)
         room_m = self.senses.map.room_up_m(own.pos_ned, own.boot_us) - s.crown_m
         if isfinite(room_m):

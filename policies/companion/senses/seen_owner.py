@@ -1,7 +1,6 @@
 """Somebody's place and velocity by sights, the owner's first of all, by the filter that policies are trained with."""
 
 from dataclasses import dataclass
-from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -27,10 +26,6 @@ class PersonNow:
     """[m²/s²] its covariance."""
     silence_s: float
     """Since they were seen; inf: never."""
-
-    def vel_std(self, way: Floats) -> float:
-        """How uncertain their speed along a level way is [m/s]: one standard deviation."""
-        return sqrt(max(float(way @ self.vel_var @ way), 0.0)) / max(float(np.hypot(*way)), 1e-3)
 
 
 class SeenOwner:

@@ -8,7 +8,7 @@ import warp as wp
 
 from policies.tasks.flight.own_state import Command, OwnState
 from policies.tasks.follow_me.tracked.keep_off import SLOW_S, STOP_S, KeepOff, bounds, kept_off
-from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, place_now, velocity_now, velocity_std
+from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, place_now, std_along, velocity_now
 
 wp.set_module_options({"enable_backward": False})
 
@@ -25,7 +25,7 @@ def guarded(command: Command, own: OwnState, owner: OwnerFilter, k: KeepOff) -> 
     way = wp.vec2(place[0] - own.pos_ned[0], place[1] - own.pos_ned[1])
     own_vel = wp.vec2(own.vel_ned[0], own.vel_ned[1])
     over_m = place[2] - own.pos_ned[2]
-    b = bounds(k, way, own_vel, velocity_now(owner), velocity_std(owner, way), owner.age_s, over_m)
+    b = bounds(k, way, own_vel, velocity_now(owner), std_along(owner.both.vel_var, way), owner.age_s, over_m)
     level = kept_off(scale * wp.vec2(command.vel_ned[0], command.vel_ned[1]), way, b.closing_max)
     command.vel_ned = wp.vec3(level[0], level[1], wp.min(scale * command.vel_ned[2], b.sinking_max))
     return command

@@ -141,9 +141,9 @@ def velocity_now(f: OwnerFilter) -> wp.vec2:
 
 
 @wp.func
-def velocity_std(f: OwnerFilter, way: wp.vec2) -> float:
-    """How uncertain their speed along a way was when they were seen [m/s]: one standard deviation."""
-    return wp.sqrt(wp.max(wp.dot(way, f.both.vel_var * way) / wp.max(wp.dot(way, way), 1.0e-6), 0.0))
+def std_along(var: wp.mat22, way: wp.vec2) -> float:
+    """One standard deviation along a way, of a covariance."""
+    return wp.sqrt(wp.max(wp.dot(way, var * way) / wp.max(wp.dot(way, way), 1.0e-6), 0.0))
 
 
 @wp.kernel(enable_backward=False)
