@@ -127,7 +127,7 @@ def judge(
     gamma: Annotated[
         float | None, typer.Option(min=0.0, max=0.9999, help="Discount; left out: that of the task's recipe.")
     ] = None,
-    width: Annotated[float, typer.Option(min=0.01, max=2.0, help="Of the Gaussian around a policy's actions.")] = 0.2,
+    width: Annotated[float, typer.Option(min=0.01, max=2.0, help="Of the Gaussian around a policy's actions.")] = 0.4,
     clip: Annotated[float, typer.Option(min=1.0, help="Of importance weights, from above.")] = 1000.0,
     steps: Annotated[int, typer.Option(min=1, help="Gradient steps of fitted Q evaluation.")] = 3000,
     picture: Annotated[Path | None, typer.Option(help="Write where policies leave the data as a PNG.")] = None,

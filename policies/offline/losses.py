@@ -45,6 +45,18 @@ def gaussian_log_probs(mean: Tensor, log_deviation: Tensor, actions: Tensor) -> 
     return (-0.5 * off.square() - log_deviation - _LOG_SQRT_2PI).sum(dim=-1)
 
 
+def clipped_log_probs(mean: Tensor, log_deviation: Tensor, actions: Tensor) -> Tensor:
+    """Log-probability of continuous actions that were drawn and then clipped to [-1, 1], summed, shape (...).
+
+    Where an action is a bound, that of all beyond it (Tobin 1958); elsewhere the density.
+    """
+    inverse = (-log_deviation).exp()
+    off = (actions - mean) * inverse
+    inside = -0.5 * off.square() - log_deviation - _LOG_SQRT_2PI
+    beyond = torch.special.log_ndtr(torch.where(actions > 0.0, (mean - 1.0) * inverse, (-1.0 - mean) * inverse))
+    return torch.where(actions.abs() >= 1.0, beyond, inside).sum(dim=-1)
+
+
 def choice_log_probs(choice_logs: Tensor, branches: Tensor) -> Tensor:
     """Log-probability of choices, summed over the branches, shape (...).
 

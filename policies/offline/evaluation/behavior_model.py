@@ -1,7 +1,7 @@
-"""Who recorded the decisions, as far as the recording tells: a Gaussian of actions, fitted by behavioural cloning.
+"""Who recorded the decisions, as far as the recording tells: Gaussians of actions, fitted by behavioural cloning.
 
-In: a store. Out: mean and deviation of each action at an observation. A tenth of the episodes is held out, and the
-weights with which these are likeliest are kept. Actions that were clipped to [-1, 1] are taken as they lie.
+In: a store. Out: how likely actions are at an observation; several may have recorded it, hence a mixture. A tenth of
+the episodes is held out, and the weights with which these are likeliest are kept. Actions at a bound were clipped.
 """
 
 import math
@@ -10,16 +10,18 @@ import torch
 from torch import Tensor
 
 from policies.offline.flat_parameters import FlatOptimizer
-from policies.offline.losses import gaussian_log_probs
+from policies.offline.losses import clipped_log_probs
 from policies.offline.stacked_networks import StackedNetworks
 from policies.offline.store import OfflineStore
 
 _RATE, _BATCH, _LOOK, _PATIENCE = 1.0e-3, 512, 100, 5
 _LOG_DEVIATION = -3.0, 0.7  # bounds, of actions in -1 to 1 (guess)
+_PILOTS = 2  # components
+_LEAST_SHARE = 0.05  # of a component that counts as somebody
 
 
 class BehaviorModel:
-    """A Gaussian of recorded continuous actions.
+    """A mixture of Gaussians of recorded continuous actions.
 
     Args:
         store: what was recorded.
@@ -33,7 +35,7 @@ class BehaviorModel:
         statistics = store.statistics()
         self._mean, self._scale = statistics.mean.float(), (statistics.variance.float() + 1e-6).rsqrt()
         self._actions = len(store.layout.continuous)
-        sizes = [store.layout.observation_size, hidden, hidden, 2 * self._actions]
+        sizes = [store.layout.observation_size, hidden, hidden, _PILOTS * (1 + 2 * self._actions)]
         self._network = StackedNetworks(1, sizes, generator)
         optimizer = FlatOptimizer(self._network.parameters(), _RATE)
         held, learnt = split_rows(store, generator)
@@ -51,20 +53,23 @@ class BehaviorModel:
                     break
         optimizer.vector.data.copy_(best_vector)
 
-    def __call__(self, observations: Tensor) -> tuple[Tensor, Tensor]:
-        """Mean and log deviation of the actions, each of shape (rows, actions)."""
+    def __call__(self, observations: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Log share (rows, components), mean and log deviation (rows, components, actions) of each."""
         inputs = ((observations - self._mean) * self._scale).clamp(-10.0, 10.0)
-        mean, log_deviation = self._network(inputs)[0].split(self._actions, dim=-1)
-        return mean, log_deviation.clamp(*_LOG_DEVIATION)
+        shares, rest = self._network(inputs)[0].split((_PILOTS, 2 * _PILOTS * self._actions), dim=-1)
+        mean, log_deviation = rest.unflatten(-1, (_PILOTS, 2 * self._actions)).split(self._actions, dim=-1)
+        return shares.log_softmax(dim=-1), mean, log_deviation.clamp(*_LOG_DEVIATION)
 
     def log_density(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Of actions, shape (rows,)."""
-        return gaussian_log_probs(*self(observations), actions)
+        shares, mean, log_deviation = self(observations)
+        return (shares + clipped_log_probs(mean, log_deviation, actions[:, None])).logsumexp(dim=-1)
 
     def distance(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """How many deviations actions are from the mean, as a length, shape (rows,)."""
-        mean, log_deviation = self(observations)
-        return ((actions - mean) * (-log_deviation).exp()).square().sum(-1).sqrt()
+        """How many deviations actions are from the nearest mean, as a length, shape (rows,)."""
+        shares, mean, log_deviation = self(observations)
+        away = ((actions[:, None] - mean) * (-log_deviation).exp()).square().sum(-1).sqrt()
+        return away.masked_fill(shares.exp() < _LEAST_SHARE, torch.inf).amin(-1)
 
 
 def split_rows(store: OfflineStore, generator: torch.Generator) -> tuple[Tensor, Tensor]:

@@ -22,11 +22,11 @@ from policies.offline.evaluation.weighted_returns import (
     importance_weighted,
 )
 from policies.offline.fitted_q import FittedQ
-from policies.offline.losses import gaussian_log_probs
+from policies.offline.losses import clipped_log_probs
 from policies.offline.store import OfflineStore
 
 CLIP = 1000.0  # of the weights (guess)
-WIDTH = 0.2  # of the judged policy's Gaussian, of actions in -1 to 1
+WIDTH = 0.4  # of the judged policy's Gaussian, of actions in -1 to 1: narrower, few recorded actions count
 SUPPORT = 0.99  # fraction of the recorded actions that is called the data's support
 _OWN_ACTIONS = 4  # drawn of the judged policy at each observation, for what it is worth there
 
@@ -110,7 +110,7 @@ class Judge:
         rows = store.decisions
         own, done = fitted.actions[rows], store.continuous[rows]
         log_width = torch.full_like(own, float(np.log(width)))
-        ratios = gaussian_log_probs(own, log_width, done) - self._densities
+        ratios = clipped_log_probs(own, log_width, done) - self._densities
         generator = torch.Generator().manual_seed(self._settings.seed)
         values = torch.zeros(len(rows))
         for _ in range(_OWN_ACTIONS):

@@ -92,9 +92,28 @@ def test_the_behaviour_is_found():
         seen = rng.uniform(-1, 1, 2)
         rows += [[*seen, 0.5 * seen[0] + rng.normal(0.0, 0.2), 0.0, 1.0, 1.0], [*seen, 0.0, 0.0, 0.0, 0.0]]
     model = BehaviorModel(store_of(PUSHED, rows), hidden=16, steps=600)
-    mean, log_deviation = model(torch.tensor([[0.8, 0.0], [-0.8, 0.5]]))
-    assert mean[:, 0].tolist() == pytest.approx([0.4, -0.4], abs=0.08)
-    assert log_deviation.exp().mean().item() == pytest.approx(0.2, abs=0.05)
+    shares, means, log_deviations = model(torch.tensor([[0.8, 0.0], [-0.8, 0.5]]))
+    weights = shares.exp()
+    mean = (weights * means[..., 0]).sum(-1)
+    square = (weights * (means[..., 0].square() + (2.0 * log_deviations[..., 0]).exp())).sum(-1)
+    assert mean.tolist() == pytest.approx([0.4, -0.4], abs=0.08)
+    assert (square - mean.square()).sqrt().mean().item() == pytest.approx(0.2, abs=0.05)
+
+
+def test_two_who_recorded_are_told_apart():
+    """One pushes to 0.5, one to -0.5, half of the decisions each: nobody pushes with nothing."""
+    rng = np.random.default_rng(1)
+    rows = []
+    for _ in range(1500):
+        seen = rng.uniform(-1, 1, 2)
+        rows += [[*seen, rng.choice((-0.5, 0.5)) + rng.normal(0.0, 0.1), 0.0, 1.0, 1.0], [*seen, 0.0, 0.0, 0.0, 0.0]]
+    model = BehaviorModel(store_of(PUSHED, rows), hidden=16, steps=1500)
+    seen, pushes = torch.zeros(3, 2), torch.tensor([[0.5], [-0.5], [0.0]])
+    right, left, nothing = model.log_density(seen, pushes).exp().tolist()
+    hand = 0.5 / (0.1 * math.sqrt(2.0 * math.pi))
+    assert [right, left] == pytest.approx([hand, hand], rel=0.2)
+    assert nothing < 0.05 * hand
+    assert model.distance(seen, pushes)[2] > 3.0
 
 
 def test_a_policy_off_the_data_is_said_to_be():

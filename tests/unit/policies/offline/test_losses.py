@@ -34,6 +34,16 @@ def test_advantages_count_exponentially_up_to_a_limit():
     assert got.tolist() == pytest.approx([1.0, math.exp(2.0), math.exp(-2.0), 100.0])
 
 
+def test_clipped_actions_are_as_likely_as_all_that_was_clipped():
+    """Half of a Gaussian around a bound lies beyond it; density inside and both tails come to one."""
+    assert losses.clipped_log_probs(t(1.0), t(-1.0), t(1.0)).exp().item() == pytest.approx(0.5)
+    assert losses.clipped_log_probs(t(-1.0), t(-1.0), t(-1.0)).exp().item() == pytest.approx(0.5)
+    mean, log_deviation, inside = t(0.4), t(-0.5), torch.linspace(-1.0, 1.0, 2003, dtype=torch.float64)[1:-1]
+    density = losses.clipped_log_probs(mean.expand(2001, 1), log_deviation, inside[:, None]).exp()
+    tails = sum(losses.clipped_log_probs(mean, log_deviation, t(bound)).exp().item() for bound in (-1.0, 1.0))
+    assert density.sum().item() * 2.0 / 2002 + tails == pytest.approx(1.0, abs=1e-3)
+
+
 def test_gaussian_log_probs_are_summed_over_the_actions():
     # Deviations 1 and 2; off by 1 and by 2, one deviation each: -0.5 - ln s - 0.5 ln 2 pi
     got = losses.gaussian_log_probs(t(0.0, 0.0), t(0.0, math.log(2.0)), t(1.0, 2.0))
