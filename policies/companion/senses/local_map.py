@@ -54,6 +54,7 @@ class LocalMap:
         near = np.arange(-_OWN_M, _OWN_M + CELL_M, CELL_M)
         self._own = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _OWN_M])
         self._hull = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _HULL_M])
+        self._person = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _OWNER_M])
 
     def see(self, pixels: NDArray[np.uint8], pose: Pose, owner: tuple[Floats, Floats] | None, now_us: int) -> None:
         """Takes in a picture.
@@ -121,9 +122,12 @@ class LocalMap:
         self._open(here, units, free_m, now_us)
 
     def _open_ahead(self, place: Floats, velocity: Floats, now_us: int) -> None:
-        """Notes as free, but for what is known to be solid, where somebody walks: they look where they go."""
+        """Notes as free, but for what is known to be solid, where somebody walks: they look where they go.
+
+        As wide as they keep off trees: from the vehicle they hide more than themselves.
+        """
         along = np.arange(0.0, _LEAD_S + 0.04, 0.04)[:, None, None] * velocity[:2]
-        rows, columns = self._cells((place[:2] + along + self._hull).reshape(-1, 2))
+        rows, columns = self._cells((place[:2] + along + self._person).reshape(-1, 2))
         is_open = self._solid_us[rows, columns] <= now_us - _SOLID_US
         self._free_us[rows[is_open], columns[is_open]] = now_us
 

@@ -70,6 +70,15 @@ def test_where_the_owner_runs_is_free_but_for_what_was_seen_to_be_solid() -> Non
     assert way_m(seen, HERE, NORTH)[1] == pytest.approx(4.0, abs=2.5 * CELL_M)
 
 
+def test_where_the_owner_runs_is_free_as_wide_as_they_keep_off_trees() -> None:
+    """To 0.6 m beside their way, half a cell and the grid's own step more, and no farther."""
+    seen = LocalMap()
+    seen.see(picture(2.0), POSE, (np.add(HERE, (2.0, 0.0, 0.0)), np.array([4.0, 0.0])), 0)
+    for aside_m, is_free in ((0.4, True), (-0.4, True), (1.0, False), (-1.0, False)):
+        beside = np.array(HERE[:2]) + (4.0, aside_m)
+        assert seen.room(beside[None], HERE, 0)[1][0] == is_free
+
+
 def test_without_returns_there_is_no_depth_and_only_the_line_to_whom_it_sees_is_free() -> None:
     seen = LocalMap()
     seen.see(picture(None), POSE, None, 0)
