@@ -51,7 +51,7 @@ def main(
     policies = _policies(folder, seed)
     store = open_store([str(folder / name) for name in RECORDED])
     settings = JudgeSettings(GAMMA, steps=steps)
-    judge = Judge(store, settings)
+    judge = Judge(store, settings, (episodes,) * len(RECORDED))
     rows = []
     for name, policy in policies.items():
         began = time.process_time()
@@ -78,11 +78,14 @@ def main(
 
 
 def _compared(rows: list[dict[str, Any]], key: str) -> dict[str, float]:
-    """Rank correlation with the truth, and how many intervals hold it."""
-    truths = np.array([row[ESTIMATES[key].truth][0] for row in rows])
-    low, high = np.array([row[key][1:] for row in rows]).T
-    held = int(((low <= truths) & (truths <= high)).sum())
-    return {"spearman": spearman(np.array([row[key][0] for row in rows]), truths), "held": held, "of": len(rows)}
+    """Rank correlation with the truth, and how many intervals hold it: of what is judged, and of what flies."""
+    values, low, high = np.array([row[key] for row in rows]).T
+    found: dict[str, float] = {"of": len(rows)}
+    for name, truth in (("", ESTIMATES[key].truth), ("flown_", "truth")):
+        truths = np.array([row[truth][0] for row in rows])
+        found[f"{name}spearman"] = spearman(values, truths)
+        found[f"{name}held"] = int(((low <= truths) & (truths <= high)).sum())
+    return found
 
 
 def _mean(returns: NDArray[np.float64]) -> tuple[float, float]:

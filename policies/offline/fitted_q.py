@@ -41,15 +41,25 @@ class FittedQ:
         gamma: discount of the rewards.
         seed: of all draws.
         hidden: units of each of two layers.
+        width: of a Gaussian around those actions, clipped to the bounds, that is judged instead; 0: none.
 
     Raises:
         ValueError: a policy with memory, images or choices.
     """
 
-    def __init__(self, store: OfflineStore, policy: Policy, gamma: float, *, seed: int = 0, hidden: int = 128) -> None:
+    def __init__(
+        self,
+        store: OfflineStore,
+        policy: Policy,
+        gamma: float,
+        *,
+        seed: int = 0,
+        hidden: int = 128,
+        width: float = 0.0,
+    ) -> None:
         if policy.memory_size or policy.layout.image is not None or policy.layout.branches:
             raise ValueError("fitted Q evaluation is for policies of continuous actions without memory or images")
-        self._store, self._gamma = store, gamma
+        self._store, self._gamma, self._width = store, gamma, width
         self._generator = torch.Generator().manual_seed(seed)
         statistics = store.statistics()
         self._mean, self._scale = statistics.mean.float(), (statistics.variance.float() + 1e-6).rsqrt()
@@ -74,7 +84,9 @@ class FittedQ:
             rows = self._store.decisions[drawn]
             batch = self._store.take(rows)
             with torch.no_grad():
-                next_values = self._targets(self._inputs(batch.next_observations, self.actions[rows + 1]))[..., 0]
+                next_values = self._targets(
+                    self._inputs(batch.next_observations, self.drawn(rows + 1, self._generator))
+                )[..., 0]
                 goes_on = 1.0 - batch.is_terminated
                 wanted = batch.rewards / self._unit + self._gamma * goes_on * next_values.clamp(low, high)
             values = self._networks(self._inputs(batch.observations, batch.continuous))[..., 0]
@@ -94,12 +106,19 @@ class FittedQ:
         apart = self.actions[decisions] - self._store.continuous[decisions]
         return Estimate(mean, mean - half, mean + half, float(apart.square().mean().sqrt()))
 
+    def drawn(self, rows: Tensor, generator: torch.Generator) -> Tensor:
+        """Actions of what is judged at the observations of some rows (B,), shape (B, actions)."""
+        actions = self.actions[rows]
+        if self._width == 0.0:
+            return actions
+        return (actions + self._width * torch.randn(actions.shape, generator=generator)).clamp(-1.0, 1.0)
+
     @torch.no_grad()
     def values(self, rows: Tensor, actions: Tensor) -> Tensor:
-        """What actions (B, actions) are worth at the observations of some rows (B,), shape (B,)."""
+        """What each network says actions (B, actions) are worth at the observations of some rows (B,), (members, B)."""
         parts = zip(torch.split(rows, _ROWS), torch.split(actions, _ROWS), strict=True)
-        found = [self._targets(self._inputs(self._store.observations[a], b))[..., 0].mean(dim=0) for a, b in parts]
-        return self._unit * torch.cat(found)
+        found = [self._targets(self._inputs(self._store.observations[a], b))[..., 0] for a, b in parts]
+        return self._unit * torch.cat(found, dim=1)
 
     def _inputs(self, observations: Tensor, actions: Tensor) -> Tensor:
         return torch.cat([((observations - self._mean) * self._scale).clamp(-10.0, 10.0), actions], dim=-1)

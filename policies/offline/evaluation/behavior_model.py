@@ -1,7 +1,7 @@
-"""Who recorded the decisions, as far as the recording tells: Gaussians of actions, fitted by behavioural cloning.
+"""Who recorded the decisions, as far as the recording tells: a Gaussian of actions, fitted by behavioural cloning.
 
-In: a store. Out: how likely actions are at an observation; several may have recorded it, hence a mixture. A tenth of
-the episodes is held out, and the weights with which these are likeliest are kept. Actions at a bound were clipped.
+In: some episodes of a store, all of one pilot. Out: how likely actions are at an observation. A tenth of the episodes
+is held out, and the weights with which these are likeliest are kept. Actions at a bound are taken to be clipped.
 """
 
 import math
@@ -16,29 +16,30 @@ from policies.offline.store import OfflineStore
 
 _RATE, _BATCH, _LOOK, _PATIENCE = 1.0e-3, 512, 100, 5
 _LOG_DEVIATION = -3.0, 0.7  # bounds, of actions in -1 to 1 (guess)
-_PILOTS = 2  # components
-_LEAST_SHARE = 0.05  # of a component that counts as somebody
 
 
 class BehaviorModel:
-    """A mixture of Gaussians of recorded continuous actions.
+    """A Gaussian of recorded continuous actions, clipped to their bounds.
 
     Args:
         store: what was recorded.
+        episodes: those of the pilot; none: all.
         seed: of all draws.
         hidden: units of each of two layers.
         steps: gradient steps at most.
     """
 
-    def __init__(self, store: OfflineStore, *, seed: int = 0, hidden: int = 64, steps: int = 3000) -> None:
+    def __init__(
+        self, store: OfflineStore, episodes: range | None = None, *, seed: int = 0, hidden: int = 64, steps: int = 3000
+    ) -> None:
         generator = torch.Generator().manual_seed(seed)
         statistics = store.statistics()
         self._mean, self._scale = statistics.mean.float(), (statistics.variance.float() + 1e-6).rsqrt()
         self._actions = len(store.layout.continuous)
-        sizes = [store.layout.observation_size, hidden, hidden, _PILOTS * (1 + 2 * self._actions)]
+        sizes = [store.layout.observation_size, hidden, hidden, 2 * self._actions]
         self._network = StackedNetworks(1, sizes, generator)
         optimizer = FlatOptimizer(self._network.parameters(), _RATE)
-        held, learnt = split_rows(store, generator)
+        held, learnt = split_rows(store, generator, episodes)
         best, best_vector, waited = math.inf, optimizer.vector.detach().clone(), 0
         for step in range(steps):
             rows = learnt[torch.randint(len(learnt), (_BATCH,), generator=generator)]
@@ -53,32 +54,29 @@ class BehaviorModel:
                     break
         optimizer.vector.data.copy_(best_vector)
 
-    def __call__(self, observations: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Log share (rows, components), mean and log deviation (rows, components, actions) of each."""
+    def __call__(self, observations: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean and log deviation of the actions before they are clipped, each of shape (rows, actions)."""
         inputs = ((observations - self._mean) * self._scale).clamp(-10.0, 10.0)
-        shares, rest = self._network(inputs)[0].split((_PILOTS, 2 * _PILOTS * self._actions), dim=-1)
-        mean, log_deviation = rest.unflatten(-1, (_PILOTS, 2 * self._actions)).split(self._actions, dim=-1)
-        return shares.log_softmax(dim=-1), mean, log_deviation.clamp(*_LOG_DEVIATION)
+        mean, log_deviation = self._network(inputs)[0].split(self._actions, dim=-1)
+        return mean, log_deviation.clamp(*_LOG_DEVIATION)
 
     def log_density(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Of actions, shape (rows,)."""
-        shares, mean, log_deviation = self(observations)
-        return (shares + clipped_log_probs(mean, log_deviation, actions[:, None])).logsumexp(dim=-1)
+        return clipped_log_probs(*self(observations), actions)
 
     def distance(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """How many deviations actions are from the nearest mean, as a length, shape (rows,)."""
-        shares, mean, log_deviation = self(observations)
-        away = ((actions[:, None] - mean) * (-log_deviation).exp()).square().sum(-1).sqrt()
-        return away.masked_fill(shares.exp() < _LEAST_SHARE, torch.inf).amin(-1)
+        """How many deviations actions are from the mean within the bounds, as a length, shape (rows,)."""
+        mean, log_deviation = self(observations)
+        return ((actions - mean.clamp(-1.0, 1.0)) * (-log_deviation).exp()).square().sum(-1).sqrt()
 
 
-def split_rows(store: OfflineStore, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-    """Rows of decisions of a tenth of the episodes, and of the others; of one episode both are the same."""
-    order = torch.randperm(store.episode_count, generator=generator)
-    count = max(1, store.episode_count // 10)
-    is_held = torch.zeros(store.episode_count, dtype=torch.bool)
-    is_held[order[:count]] = True
-    held = torch.repeat_interleave(is_held, store.lengths)
-    if store.episode_count == 1:
-        return store.decisions, store.decisions
-    return store.decisions[held], store.decisions[~held]
+def split_rows(store: OfflineStore, generator: torch.Generator, episodes: range | None = None) -> tuple[Tensor, Tensor]:
+    """Rows of decisions of a tenth of some episodes, and of their others; of one episode both are the same."""
+    chosen = range(store.episode_count) if episodes is None else episodes
+    place = torch.zeros(store.episode_count, dtype=torch.long)  # 0: of none, 1: learnt from, 2: held out
+    place[chosen.start : chosen.stop] = 1
+    if len(chosen) > 1:
+        place[chosen.start + torch.randperm(len(chosen), generator=generator)[: max(1, len(chosen) // 10)]] = 2
+    placed = torch.repeat_interleave(place, store.lengths)
+    learnt = store.decisions[placed == 1]
+    return (store.decisions[placed == 2] if len(chosen) > 1 else learnt), learnt

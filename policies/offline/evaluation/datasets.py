@@ -50,7 +50,7 @@ def judged(
     """Each policy's verdict, one after the other.
 
     Args:
-        datasets: folders; several count as one.
+        datasets: folders; several count as one, each of a pilot of its own.
         policies: files, runs or names.
         gamma: discount; none: that of the task's recipe.
         options: others of `JudgeSettings`.
@@ -61,6 +61,7 @@ def judged(
     """
     try:
         store = open_store(datasets)
+        pilots = [open_store([path]).episode_count for path in datasets] if len(datasets) > 1 else ()
         named = [(name, load_policy(find_policy(name))[0]) for name in policies]
     except (CheckpointError, DemonstrationError) as error:
         raise DatasetError(str(error)) from error
@@ -72,7 +73,7 @@ def judged(
     names = tuple(element.name for element in store.layout.frame) * store.layout.stack
     with few_threads(has_images=False):
         try:
-            judge = Judge(store, settings)
+            judge = Judge(store, settings, pilots)
             for name, policy in named:
                 verdict = judge.judge(policy)
                 rows = verdict.outside[thin], verdict.distances[thin]

@@ -1,10 +1,12 @@
 """A policy judged on recorded decisions alone: three estimates of its return, and where it leaves the data.
 
 In: a store and policies without memory. Out: verdicts. Where weights are needed, the judged policy is a Gaussian of a
-stated width around its most probable action, for a deterministic one would never take a recorded action again; fitted Q
-evaluation judges the most probable action itself.
+stated width around its most probable action, clipped to the bounds, for a deterministic one would never take a recorded
+action again; fitted Q evaluation judges the most probable action itself. What follows a recording that ended because
+time was up is fitted Q's.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,17 +68,31 @@ class Judge:
     Args:
         store: what was recorded, of continuous actions.
         settings: how to judge.
+        pilots: how many of the episodes each of those who recorded it has, one after the other; none: one has all.
     """
 
-    def __init__(self, store: OfflineStore, settings: JudgeSettings) -> None:
+    def __init__(self, store: OfflineStore, settings: JudgeSettings, pilots: Sequence[int] = ()) -> None:
         if not store.layout.continuous or store.layout.branches or store.layout.image is not None:
             raise ValueError(f"{store.layout.task}: only recordings of continuous actions without images are judged")
         self._store, self._settings = store, settings
-        self._behavior = BehaviorModel(store, seed=settings.seed)
+        counts = pilots or (store.episode_count,)
+        ends = np.cumsum(counts).tolist()
+        self._pilots = [
+            BehaviorModel(store, range(end - count, end), seed=settings.seed)
+            for end, count in zip(ends, counts, strict=True)
+        ]
         with torch.no_grad():
             seen, done = store.observations[store.decisions], store.continuous[store.decisions]
-            self._densities = self._behavior.log_density(seen, done)
-            self.limit = float(np.quantile(self._behavior.distance(seen, done).numpy(), SUPPORT))
+            each = np.stack([self._padded(pilot.log_density(seen, done)) for pilot in self._pilots])
+            self.limit = float(np.quantile(self._distances(done), SUPPORT))
+        shares = np.log(np.array(counts) / store.episode_count)[:, None, None]
+        so_far = np.logaddexp.reduce(shares + np.cumsum(each, axis=2), axis=0)
+        self._densities = np.diff(so_far, axis=1, prepend=0.0)  # (episodes, decisions) of what all of them do together
+
+    def _distances(self, actions: Tensor) -> Floats:
+        """How many deviations actions are off what the nearest of the pilots does, shape (decisions,)."""
+        seen = self._store.observations[self._store.decisions]
+        return torch.stack([pilot.distance(seen, actions) for pilot in self._pilots]).amin(0).double().numpy()
 
     def judge(self, policy: Policy) -> Verdict:
         """What a policy would return.
@@ -88,10 +104,11 @@ class Judge:
         fitted = FittedQ(store, policy, settings.gamma, seed=settings.seed, hidden=settings.hidden)
         fitted.fit(settings.steps)
         found = fitted.estimate()
-        episodes = self._episodes(fitted)
+        drawn = FittedQ(store, policy, settings.gamma, seed=settings.seed, hidden=settings.hidden, width=settings.width)
+        drawn.fit(settings.steps)
+        episodes = self._episodes(drawn)
         with torch.no_grad():
-            own = fitted.actions[store.decisions]
-            distances = self._behavior.distance(store.observations[store.decisions], own).double().numpy()
+            distances = self._distances(fitted.actions[store.decisions])
         scale = 1.0 - settings.gamma
         return Verdict(
             Interval(found.mean, found.low, found.high),
@@ -105,19 +122,24 @@ class Judge:
 
     @torch.no_grad()
     def _episodes(self, fitted: FittedQ) -> PaddedEpisodes:
-        """The recorded episodes with the ratios and values of a policy."""
+        """The recorded episodes with the ratios and values of a policy's Gaussian."""
         store, width = self._store, self._settings.width
         rows = store.decisions
         own, done = fitted.actions[rows], store.continuous[rows]
-        log_width = torch.full_like(own, float(np.log(width)))
-        ratios = clipped_log_probs(own, log_width, done) - self._densities
+        ratios = self._padded(clipped_log_probs(own, torch.full_like(own, float(np.log(width))), done))
         generator = torch.Generator().manual_seed(self._settings.seed)
-        values = torch.zeros(len(rows))
-        for _ in range(_OWN_ACTIONS):
-            drawn = own + width * torch.randn(own.shape, generator=generator)
-            values += fitted.values(rows, drawn.clamp(-1.0, 1.0)) / _OWN_ACTIONS
-        columns = (ratios, store.rewards[rows], fitted.values(rows, done), values)
-        return PaddedEpisodes(*(self._padded(column) for column in columns))
+        lasts = store.starts + store.lengths - 1
+        tails = self._worth(fitted, lasts + 1, generator).mean(0) * (1.0 - store.is_terminated[lasts])
+        rewards = self._padded(store.rewards[rows])
+        rewards[np.arange(len(lasts)), store.lengths.numpy() - 1] += self._settings.gamma * tails.double().numpy()
+        opinions = (fitted.values(rows, done), self._worth(fitted, rows, generator))
+        taken_values, values = (np.stack([self._padded(each) for each in opinion]) for opinion in opinions)
+        return PaddedEpisodes(ratios - self._densities, rewards, taken_values, values)
+
+    def _worth(self, fitted: FittedQ, rows: Tensor, generator: torch.Generator) -> Tensor:
+        """Of the policy's Gaussian at the observations of some rows, by each network, shape (members, rows)."""
+        drawn = (fitted.drawn(rows, generator) for _ in range(_OWN_ACTIONS))
+        return torch.stack([fitted.values(rows, actions) for actions in drawn]).mean(0)
 
     def _padded(self, column: Tensor) -> Floats:
         """A value of each decision as (episodes, decisions)."""

@@ -5,8 +5,9 @@ intervals over episodes. Weights are per decision and normalised over the episod
 weighted doubly robust: Thomas and Brunskill 2016, eq. 11). An episode that has ended keeps its last weight. NumPy only.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,8 @@ class PaddedEpisodes:
 
     log_ratios: Floats  # log of how much likelier the judged policy takes the recorded action
     rewards: Floats
-    taken_values: Floats  # what the recorded action is said to be worth
-    values: Floats  # what the judged policy's own action is said to be worth
+    taken_values: Floats  # what the recorded action is said to be worth; or (opinions, episodes, decisions)
+    values: Floats  # what the judged policy's own action is said to be worth; likewise
 
     def weights(self, clip: float) -> Floats:
         """The products of the ratios up to each decision, none above `clip`."""
@@ -40,20 +41,22 @@ def importance_weighted(episodes: PaddedEpisodes, gamma: float, clip: float, see
     def figure(counts: Floats) -> Floats:
         return (counts @ (weights * episodes.rewards) / (counts @ weights)) @ discounts
 
-    return _with_bootstrap(figure, len(weights), seed)
+    return _with_bootstrap([figure], len(weights), seed)
 
 
 def doubly_robust(episodes: PaddedEpisodes, gamma: float, clip: float, seed: int = 0) -> Interval:
-    """The discounted return by values, corrected where the weighted episodes went otherwise."""
+    """The discounted return by values, corrected where the weighted episodes went otherwise; mean of all opinions."""
     weights = episodes.weights(clip)
     before = np.concatenate((np.ones((len(weights), 1)), weights[:, :-1]), axis=1)
     discounts = gamma ** np.arange(weights.shape[1])
+    taken, own = (np.atleast_3d(each.T).T for each in (episodes.taken_values, episodes.values))  # (opinions, …)
 
-    def figure(counts: Floats) -> Floats:
-        corrections = counts @ (weights * (episodes.rewards - episodes.taken_values)) / (counts @ weights)
-        return (corrections + counts @ (before * episodes.values) / (counts @ before)) @ discounts
+    def figure(counts: Floats, taken_values: Floats, values: Floats) -> Floats:
+        corrections = counts @ (weights * (episodes.rewards - taken_values)) / (counts @ weights)
+        return (corrections + counts @ (before * values) / (counts @ before)) @ discounts
 
-    return _with_bootstrap(figure, len(weights), seed)
+    opinions = [partial(figure, taken_values=a, values=b) for a, b in zip(taken, own, strict=True)]
+    return _with_bootstrap(opinions, len(weights), seed)
 
 
 def effective_sample_size(episodes: PaddedEpisodes, clip: float) -> float:
@@ -62,9 +65,11 @@ def effective_sample_size(episodes: PaddedEpisodes, clip: float) -> float:
     return float(last.sum() ** 2 / np.square(last).sum())
 
 
-def _with_bootstrap(figure: Callable[[Floats], Floats], count: int, seed: int) -> Interval:
-    """The figure of all episodes, and its percentile interval over episodes drawn anew."""
-    value = float(figure(np.ones((1, count)))[0])
+def _with_bootstrap(figures: Sequence[Callable[[Floats], Floats]], count: int, seed: int) -> Interval:
+    """The mean figure of all episodes, and the percentile interval over episodes and figures drawn anew."""
+    value = float(np.mean([figure(np.ones((1, count))) for figure in figures]))
     drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), DRAWS).astype(np.float64)
-    low, high = np.percentile(figure(drawn), (2.5, 97.5))
+    parts = np.array_split(drawn, len(figures))
+    found = np.concatenate([figure(part) for figure, part in zip(figures, parts, strict=True)])
+    low, high = np.percentile(found, (2.5, 97.5))
     return Interval(value, float(low), float(high))
