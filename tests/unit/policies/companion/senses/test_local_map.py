@@ -75,7 +75,7 @@ def test_where_the_owner_runs_is_free_as_wide_as_they_keep_off_trees() -> None:
     seen = LocalMap()
     seen.see(picture(2.0), POSE, (np.add(HERE, (2.0, 0.0, 0.0)), np.array([4.0, 0.0])), 0)
     for aside_m, is_free in ((0.4, True), (-0.4, True), (1.0, False), (-1.0, False)):
-        beside = np.array(HERE[:2]) + (4.0, aside_m)
+        beside = np.add(HERE[:2], (4.0, aside_m))
         assert seen.room(beside[None], HERE, 0)[1][0] == is_free
 
 
