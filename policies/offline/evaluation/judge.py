@@ -85,8 +85,8 @@ class Judge:
             seen, done = store.observations[store.decisions], store.continuous[store.decisions]
             each = np.stack([self._padded(pilot.log_density(seen, done)) for pilot in self._pilots])
             self.limit = float(np.quantile(self._distances(done), SUPPORT))
-        shares = np.log(np.array(counts) / store.episode_count)[:, None, None]
-        so_far = np.logaddexp.reduce(shares + np.cumsum(each, axis=2), axis=0)
+        log_fractions = np.log(np.array(counts) / store.episode_count)[:, None, None]
+        so_far = np.logaddexp.reduce(log_fractions + np.cumsum(each, axis=2), axis=0)
         self._densities = np.diff(so_far, axis=1, prepend=0.0)  # (episodes, decisions) of what all of them do together
 
     def _distances(self, actions: Tensor) -> Floats:
