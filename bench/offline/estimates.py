@@ -46,6 +46,7 @@ def main(
     """Judges all policies and compares."""
     torch.set_num_threads(1)
     console = Console(highlight=False)
+    folder /= str(seed)  # what is there is not made again
     folder.mkdir(parents=True, exist_ok=True)
     _record(folder, episodes, seed)
     policies = _policies(folder, seed)

@@ -41,8 +41,7 @@ def advantage_weights(advantages: Tensor, inverse_temperature: float, most: floa
 
 def gaussian_log_probs(mean: Tensor, log_deviation: Tensor, actions: Tensor) -> Tensor:
     """Log-probability of continuous actions, summed over them, shape (...)."""
-    off = (actions - mean) * (-log_deviation).exp()
-    return (-0.5 * off.square() - log_deviation - _LOG_SQRT_2PI).sum(dim=-1)
+    return _log_densities(mean, log_deviation, actions).sum(dim=-1)
 
 
 def clipped_log_probs(mean: Tensor, log_deviation: Tensor, actions: Tensor) -> Tensor:
@@ -50,9 +49,7 @@ def clipped_log_probs(mean: Tensor, log_deviation: Tensor, actions: Tensor) -> T
 
     Where an action is a bound, that of all beyond it (Tobin 1958); elsewhere the density.
     """
-    inverse = (-log_deviation).exp()
-    off = (actions - mean) * inverse
-    inside = -0.5 * off.square() - log_deviation - _LOG_SQRT_2PI
+    inside, inverse = _log_densities(mean, log_deviation, actions), (-log_deviation).exp()
     beyond = torch.special.log_ndtr(torch.where(actions > 0.0, (mean - 1.0) * inverse, (-1.0 - mean) * inverse))
     return torch.where(actions.abs() >= 1.0, beyond, inside).sum(dim=-1)
 
@@ -100,3 +97,9 @@ def mixture_log_probs(component_logs: Tensor, means: Tensor, log_deviations: Ten
     """
     each = gaussian_log_probs(means, log_deviations, actions[..., None, :])
     return torch.logsumexp(component_logs + each, dim=-1)
+
+
+def _log_densities(mean: Tensor, log_deviation: Tensor, actions: Tensor) -> Tensor:
+    """Of each action by itself."""
+    off = (actions - mean) * (-log_deviation).exp()
+    return -0.5 * off.square() - log_deviation - _LOG_SQRT_2PI

@@ -49,7 +49,7 @@ def doubly_robust(episodes: PaddedEpisodes, gamma: float, clip: float, seed: int
     weights = episodes.weights(clip)
     before = np.concatenate((np.ones((len(weights), 1)), weights[:, :-1]), axis=1)
     discounts = gamma ** np.arange(weights.shape[1])
-    taken, own = (np.atleast_3d(each.T).T for each in (episodes.taken_values, episodes.values))  # (opinions, …)
+    taken, own = (each.reshape(-1, *weights.shape) for each in (episodes.taken_values, episodes.values))
 
     def figure(counts: Floats, taken_values: Floats, values: Floats) -> Floats:
         corrections = counts @ (weights * (episodes.rewards - taken_values)) / (counts @ weights)
