@@ -69,24 +69,54 @@ def _heights(worlds: wp.array[World], points: wp.array2d(dtype=wp.vec2), out: wp
     out[i, k] = ground_height(worlds[i], points[i, k][0], points[i, k][1])
 
 
+class Stage:
+    """So many vehicles at once, each in a world of its own, with people before them.
+
+    Args:
+        seed: of everything.
+        is_test: in worlds that no other split has.
+    """
+
+    def __init__(self, seed: int, *, is_test: bool = False) -> None:
+        self.rng = np.random.default_rng([seed, int(is_test)])
+        self._is_test, self._turns = is_test, 0
+        self._worlds = WorldBatch(FOLLOW_WORLD, WORLDS, trees_per_ha_max=300.0)
+        self._people = wp.zeros((WORLDS, PEOPLE_MAX), dtype=Person)
+        self._clothes = wp.zeros((WORLDS, PEOPLE_MAX), dtype=Clothes)
+        size: dict[str, Any] = {"width": IMAGE_SIZE, "height": IMAGE_SIZE, "hfov_deg": HFOV_DEG, "has_optics": True}
+        self.camera = QuickCamera(self._worlds, WORLDS, **size, people=self._people, clothes=self._clothes)
+        self._everyone = wp.full(WORLDS, value=True, dtype=wp.bool)
+        self._packed = wp.zeros((WORLDS, IMAGE_SIZE, IMAGE_SIZE, 4), dtype=wp.uint8)
+        self.height_m = np.zeros(WORLDS)
+        """Of the lenses above the ground below them."""
+
+    @property
+    def people(self) -> Any:
+        """Who is there, (WORLDS, PEOPLE_MAX) of `Person`."""
+        return self._people.numpy()
+
+    def place(self) -> None:
+        """Everybody is somewhere else; from time to time in other worlds."""
+        if self._turns % _ROUNDS == 0:
+            _grow(self._worlds, self.rng, is_test=self._is_test)
+            self.camera.refresh()
+        self._turns += 1
+        self.height_m = _place(self._worlds, self.camera, self._people, self._clothes, self.rng)
+
+    def images(self) -> NDArray[np.uint8]:
+        """What the cameras see, as a companion gets it: (WORLDS, height, width, 4)."""
+        self.camera.render()
+        inputs = [self.camera.rgb, self.camera.depth_m, self._everyone, self._packed]
+        wp.launch(pack_images, (WORLDS, IMAGE_SIZE), inputs)
+        return np.asarray(self._packed.numpy().copy())
+
+
 def scenes(count: int, seed: int, *, is_test: bool = False) -> Scenes:
     """At least so many images; of worlds that no other split has."""
-    rng = np.random.default_rng([seed, int(is_test)])
-    worlds = WorldBatch(FOLLOW_WORLD, WORLDS, trees_per_ha_max=300.0)
-    people = wp.zeros((WORLDS, PEOPLE_MAX), dtype=Person)
-    clothes = wp.zeros((WORLDS, PEOPLE_MAX), dtype=Clothes)
-    size: dict[str, Any] = {"width": IMAGE_SIZE, "height": IMAGE_SIZE, "hfov_deg": HFOV_DEG, "has_optics": True}
-    camera = QuickCamera(worlds, WORLDS, **size, people=people, clothes=clothes)
-    everyone, packed = wp.full(WORLDS, value=True, dtype=wp.bool), wp.zeros((WORLDS, 64, 64, 4), dtype=wp.uint8)
-    parts = []
-    for turn in range(-(-count // WORLDS)):
-        if turn % _ROUNDS == 0:
-            _grow(worlds, rng, is_test=is_test)
-            camera.refresh()
-        _place(worlds, camera, people, clothes, rng)
-        camera.render()
-        wp.launch(pack_images, (WORLDS, IMAGE_SIZE), [camera.rgb, camera.depth_m, everyone, packed])
-        parts.append((packed.numpy().copy(), *_labels(camera, people.numpy())))
+    stage, parts = Stage(seed, is_test=is_test), []
+    for _ in range(-(-count // WORLDS)):
+        stage.place()
+        parts.append((stage.images(), *_labels(stage.camera, stage.people)))
     images, cells, ranges_m = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Scenes(images, cells, ranges_m)
 
@@ -99,8 +129,10 @@ def _grow(worlds: WorldBatch, rng: np.random.Generator, *, is_test: bool) -> Non
     worlds.grow(wp.full(WORLDS, value=True, dtype=wp.bool), wp.array(seeds, dtype=int))
 
 
-def _place(worlds: WorldBatch, camera: QuickCamera, people: Any, clothes: Any, rng: np.random.Generator) -> None:
-    """Puts vehicles into their worlds, people before them, and the light and the lens on."""
+def _place(
+    worlds: WorldBatch, camera: QuickCamera, people: Any, clothes: Any, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Puts vehicles into their worlds, people before them, and the light and the lens on: their heights [m]."""
     n, k = WORLDS, PEOPLE_MAX
     spread_m = np.where(rng.random(n) < _AT_HOME, _HOME_M, _SPREAD_M)[:, None]
     where = spread_m * rng.uniform(-1.0, 1.0, (n, 2))
@@ -123,7 +155,9 @@ def _place(worlds: WorldBatch, camera: QuickCamera, people: Any, clothes: Any, r
     row["vel_ned"][..., 0] = rng.uniform(0.0, 5.0, (n, k)) * (rng.random((n, k)) < 0.8)
     is_usual = wp.array((rng.random((n, k)) < 0.15).astype(np.int32), dtype=int)
     wp.launch(_dress, (n, k), [int(rng.integers(2**31)), is_usual, usual_clothes(), clothes])
-    _aim(camera, rng, where, -ground[:, 0] - rng.uniform(0.6, 4.0, n), yaw)
+    height_m = rng.uniform(0.6, 4.0, n)
+    _aim(camera, rng, where, -ground[:, 0] - height_m, yaw)
+    return np.asarray(height_m)
 
 
 def _aim(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from common.attitude import Vector, rotated, yaw_of
 from policies.companion.senses.poses import Pose
+from policies.mono_depth.network import SeenDepth
 from policies.tasks.follow_me.observe import HFOV_DEG, IMAGE_SIZE, camera_mount, depth_of
 from policies.tasks.follow_me.tracked.vector import SECTORS
 
@@ -26,6 +27,7 @@ _SOLID_US = 15_000_000  # and so long what was solid: trees stay, while who drif
 _OWNER_M = 0.6  # round the owner, who is no part of the map; they pass trees at 0.6 m from their middle
 _LEAD_S = 1.0  # nobody runs into what they reach in so long; guess
 _TOP_M = 0.3  # what is farther up than this is over the vehicle
+_NONE = 255  # of the depth channel: no return
 _ALIVE = 0.05  # fraction of pixels with depth below which there is none
 _UNSEEN = -(10**15)
 _OWN_M = 0.75  # so near nothing is seen: what is not known to be solid is taken to be free,
@@ -56,22 +58,36 @@ class LocalMap:
         self._hull = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _HULL_M])
         self._person = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _OWNER_M])
 
-    def see(self, pixels: NDArray[np.uint8], pose: Pose, owner: tuple[Floats, Floats] | None, now_us: int) -> None:
-        """Takes in a picture.
+    def see(self, depth: NDArray[np.uint8], pose: Pose, owner: tuple[Floats, Floats] | None, now_us: int) -> None:
+        """Takes in what a depth camera saw.
 
         Args:
-            pixels: (height, width, 4), the last channel depth.
+            depth: (height, width), the depth channel of a picture; 255: no return.
             pose: of the vehicle when it was taken.
             owner: place [m] and level velocity [m/s] then of who is left out, ned.
             now_us: the vehicle's clock.
         """
-        byte = pixels[..., 3].astype(np.float64)
-        is_return = byte < 255.0
-        self.has_depth = bool(is_return.mean() > _ALIVE)
         self._follow(pose.pos_ned)
-        if not self.has_depth:
-            return
-        depth_m = depth_of(np.minimum(byte, 254.0))
+        self.has_depth = bool((depth < _NONE).mean() > _ALIVE)
+        if self.has_depth:
+            self._take(depth, np.zeros(depth.shape, bool), pose, owner, now_us)
+
+    def guess(self, seen: SeenDepth, pose: Pose, owner: tuple[Floats, Floats] | None, now_us: int) -> None:
+        """Takes in what a picture's colours say, where there is no depth; people are no part of the map."""
+        self._follow(pose.pos_ned)
+        self._take(seen.depth, seen.is_person, pose, owner, now_us)
+
+    def _take(
+        self,
+        depth: NDArray[np.uint8],
+        is_person: NDArray[np.bool_],
+        pose: Pose,
+        owner: tuple[Floats, Floats] | None,
+        now_us: int,
+    ) -> None:
+        byte = depth.astype(np.float64)
+        is_return = byte < _NONE
+        depth_m = depth_of(np.minimum(byte, _NONE - 1.0))
         rotation = np.array([rotated(pose.q_ned_from_frd, axis) for axis in np.eye(3).tolist()]).T
         rays_ned = self._rays_frd @ rotation.T  # of depth 1
         points = rays_ned * depth_m[..., None]
@@ -79,8 +95,9 @@ class LocalMap:
         level_m = np.hypot(points[..., 0], points[..., 1])
         is_there = is_return & (points[..., 2] > -_ABOVE_M) & (points[..., 2] < _BELOW_M)
         self._carve(here, rays_ned, np.where(is_there, level_m, np.inf), now_us)
-        self._look_up(points[is_return & (points[..., 2] < -_TOP_M) & (level_m < REACH_M)] + pose.pos_ned, now_us)
-        is_solid = is_there & (level_m < REACH_M)
+        is_over = is_return & ~is_person & (points[..., 2] < -_TOP_M) & (level_m < REACH_M)
+        self._look_up(points[is_over] + pose.pos_ned, now_us)
+        is_solid = is_there & ~is_person & (level_m < REACH_M)
         if owner is not None:
             off = points[..., :2] + here - owner[0][:2]
             is_solid &= np.hypot(off[..., 0], off[..., 1]) > _OWNER_M

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from policies.companion.senses.phone_check import PhoneFit, Suitor
 from policies.companion.senses.poses import Pose
 from policies.companion.senses.seen_owner import PersonNow, SeenOwner
 
@@ -22,8 +23,10 @@ _LATELY_US = 600_000
 _TOGETHER_US = 300_000  # who was there so long before the owner went is not the owner
 _WALKS_M = 1.0
 _SIGHTS, _WALK_M_S = 4, 0.7  # from so many on, faster than this, somebody is surely on their way
-_MET_M = 2.5  # nearer to the owner somebody may be taken for them
 _OWNER = -1
+
+
+Tracked = tuple[SeenOwner, PhoneFit]  # somebody, and how well they fit the phone
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +36,7 @@ class _Known:
     person: SeenOwner
     met_us: int  # when they were first seen,
     first_ned: Floats  # and where [m]
+    fit: PhoneFit
 
 
 class OtherPeople:
@@ -41,8 +45,7 @@ class OtherPeople:
     def __init__(self) -> None:
         self._known: list[_Known] = []
         self.met_us: int | None = None
-        """When one of them came near the owner last, or was there without them, who walked: a trunk that the detector
-        takes for somebody does not."""
+        """When one of them was seen last who walked: a trunk that the detector takes for somebody does not."""
 
     def left(self, places: list[Floats], owner: Floats | None, pose: Pose, gone_us: int | None = None) -> list[int]:
         """Indices of the places that are nobody's whom it knows, the owner's among them; the others are taken in.
@@ -72,9 +75,7 @@ class OtherPeople:
             if who != _OWNER:
                 one = self._known[who]
                 one.person.see(places[k], pose, has_depth=True)
-                walked_m = float(np.hypot(*(places[k] - one.first_ned)[:2]))
-                apart_m = 0.0 if owner is None else float(np.hypot(*(places[k] - owner)[:2]))
-                if walked_m > _WALKS_M and apart_m < _MET_M:
+                if float(np.hypot(*(places[k] - one.first_ned)[:2])) > _WALKS_M:
                     self.met_us = pose.time_us
         return [k for k in range(len(places)) if taken.get(k, _OWNER) == _OWNER]
 
@@ -82,20 +83,27 @@ class OtherPeople:
         """Anybody may be the owner from now on."""
         self._known = []
 
-    def places(self, time_us: int) -> list[Floats]:
-        """Where they are [m], of those who were seen lately, in order."""
-        return [one.person.now(time_us)[0] for one in self._lately(time_us)]
+    def heard(self, time_us: int) -> list[Suitor]:
+        """Those who were seen lately, in order, and how well they fit the phone."""
+        return [(one.person.person_now(time_us), one.fit) for one in self._lately(time_us)]
 
     def now(self, time_us: int) -> list[PersonNow]:
         """What is known of those who were seen lately and walk: whom a trunk is taken for does not."""
         known = [one.person.person_now(time_us) for one in self._lately(time_us) if one.person.sights >= _SIGHTS]
         return [person for person in known if float(np.hypot(*person.vel)) > _WALK_M_S]
 
-    def exchange(self, index: int, owner: SeenOwner, time_us: int) -> SeenOwner:
-        """One of those places is the owner, who was taken for the owner is another; the owner."""
+    def exchange(self, index: int, owner: Tracked | None, time_us: int) -> Tracked:
+        """One of those who were heard is the owner, who was taken for the owner is another; the owner."""
         one = self._lately(time_us)[index]
-        self._known[self._known.index(one)] = _Known(owner, time_us, owner.now(time_us)[0])
-        return one.person
+        self._known.remove(one)
+        if owner is not None:
+            self.add(*owner, time_us)
+        return one.person, one.fit
+
+    def add(self, person: SeenOwner, fit: PhoneFit, time_us: int) -> None:
+        """Who was taken for the owner is another."""
+        self.met_us = time_us
+        self._known.append(_Known(person, time_us, person.now(time_us)[0], fit))
 
     def _lately(self, time_us: int) -> list[_Known]:
         return [one for one in self._known if time_us - one.person.time_us < _LATELY_US]
@@ -107,6 +115,6 @@ class OtherPeople:
             beside = [*known, *([owner] if owner is not None else [])]
             if any(float(np.hypot(*(place - other)[:2])) < _APART_M for other in beside):
                 continue
-            one = _Known(SeenOwner(), pose.time_us, place)
+            one = _Known(SeenOwner(), pose.time_us, place, PhoneFit())
             one.person.see(place, pose, has_depth=True)
             self._known.append(one)

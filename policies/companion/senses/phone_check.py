@@ -1,24 +1,36 @@
-"""Whether the phone is with whom is taken for the owner: its reports against sights.
+"""Whether the phone is with whom is taken for the owner: its reports against everybody who is seen.
 
-In: each report, where the owner is seen, where others are. Out: who else it would rather be, or that it is none of
-those who are seen. The phone's slow error is learned from the sights, and how far it goes astray from that; only others
-who came near make it doubt, for a phone alone may be wrong by many metres.
+In: each report, and where everybody is and goes. Out: who else it would rather be, or that it is none of them. Whoever
+has the phone goes as it says, and is off from where it says by an error that changes slowly: how well that fits is
+summed up for each person (a likelihood of its innovations, old reports forgotten), and compared.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from enum import Enum
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
 
+from policies.companion.senses.seen_owner import PersonNow
+
 Floats = NDArray[np.float64]
-_LEARNS = 0.05  # of each report: over some ten seconds
-_BETTER_M = 1.0  # by so much somebody else must fit better
-_OFF_M = 1.2  # nearer than this to the phone nobody is doubted
-_FAR_M = 3.5  # farther off it is not the owner, if others have been there
-_REPORTS = 3  # in a row
-_STEADY = 0.1  # of each report: by what it goes astray is learned sooner than where to
-_STRAY_M = 0.5  # a phone is taken to go astray by so much at least,
-_STRAYS = 3.0  # and what is within so many times of it is no reason to doubt
+OFF_STD_M = 1.7  # of the phone's slow error in the vehicle's frame, as the tracker takes it
+_DRIFT_M2_S = 2.0 * OFF_STD_M**2 / 60.0  # what its variance grows by
+_PLACE_VAR = 0.3**2 + 0.3**2  # [m²] white, of the phone and of sights
+_VEL_VAR = 0.2**2 + 0.2**2  # [m²/s²] of the phone, and of what somebody changes while a report is under way
+_PRIOR_VAR = 1.0  # [m²] how much another's error may differ from what has been learned
+_CHANGED_VAR, _CHANGED_MAX = 1.5, 4.0  # [m²] of a change of that error, and the most that speaks against one
+_COST_MAX = 8.0  # of one report: somebody who turns round does not go as it says
+_NOBODY = 3.5  # cost of a report if its owner is none of those who are seen; theirs is one and a half
+_SURE = 3.0  # log likelihood ratio that counts,
+_SURE_ALONE = 9.0  # and where nobody else was seen
+_FITS = 3.0  # from which an unknown one is the owner
+_MOST = 10.0  # either way: somebody may be taken for another at any time
+_HEARD = 2  # after so many reports
+_KNOWN = 8  # after so many the phone's noise is
+_STEADY = 0.1  # of each report: how soon a worse phone is noticed
 
 
 class Word(Enum):
@@ -29,44 +41,150 @@ class Word(Enum):
     NOBODY = 2  # it is none of them
 
 
+Suitor = tuple[PersonNow, "PhoneFit"]  # somebody, and how well they fit the phone
+
+
+@dataclass(slots=True)
+class PhoneNoise:
+    """By how much more than usual a phone's squares are, learned from what changes between one report and the next.
+
+    Whoever goes another way is farther off with each report, but by little: a wrong person is not taken for noise.
+    """
+
+    place: float = 1.0
+    vel: float = 1.0
+    steps: int = 0
+
+    def learn(self, place_step: Floats, vel_step: Floats | None) -> None:
+        """Takes in what the differences between phone and owner have changed by."""
+        self.steps += 1
+        gain = max(_STEADY, 1.0 / (1.0 + self.steps))
+        self.place = _learnt(self.place, gain, place_step, _PLACE_VAR)
+        if vel_step is not None:
+            self.vel = _learnt(self.vel, gain, vel_step, _VEL_VAR)
+
+
+def _learnt(scale: float, gain: float, step: Floats, var: float) -> float:
+    return max(scale + gain * (float(step @ step) / (4.0 * var) - scale), 1.0)
+
+
+@dataclass(slots=True)
+class PhoneFit:
+    """How well one person fits the phone."""
+
+    off: Floats | None = None
+    """[m] The phone's slow error, if it is theirs; None before the first report."""
+    var: float = 0.0
+    """[m²] of it, each axis."""
+    odds: float = 0.0
+    """Logarithm of how much likelier it is theirs than of nobody who is seen, by all reports."""
+    reports: int = 0
+    apart: Floats | None = None
+    """[m] Of the last report, from them."""
+    apart_vel: Floats | None = None
+
+    def hear(self, phone: Floats, phone_vel: Floats | None, who: PersonNow, since_s: float, usual: "Usual") -> None:
+        """Takes in a report.
+
+        Args:
+            phone: [m] where it puts its owner now, north and east.
+            phone_vel: [m/s] likewise; None: it does not say.
+            who: the person as of now.
+            since_s: the last report.
+            usual: of the phone.
+        """
+        noise = usual.noise
+        self.apart = phone - who.pos_ned[:2]
+        self.apart_vel = None if phone_vel is None else phone_vel - who.vel
+        if self.off is None:
+            self.off, self.var = usual.prior(self.apart)
+        self.var += _DRIFT_M2_S * noise.place * since_s
+        place_var = self.var + noise.place * _PLACE_VAR
+        astray = self.apart - self.off
+        cost = 0.5 * float(astray @ astray) / place_var + log(place_var / (noise.place * _PLACE_VAR))
+        if self.apart_vel is not None:
+            vel_var = noise.vel * _VEL_VAR + 0.5 * float(np.trace(who.vel_var))
+            cost += 0.5 * float(self.apart_vel @ self.apart_vel) / vel_var + log(vel_var / (noise.vel * _VEL_VAR))
+        self.odds += _NOBODY - min(cost, _COST_MAX)
+        self.reports += 1
+        gain = self.var / place_var
+        self.off = self.off + gain * astray
+        self.var *= 1.0 - gain
+
+
+@dataclass(slots=True)
+class Usual:
+    """What is known of the phone."""
+
+    noise: PhoneNoise = field(default_factory=PhoneNoise)
+    off: Floats | None = None
+    """[m] Its slow error, level, of who was surely the owner; None: not known yet."""
+
+    def prior(self, apart: Floats) -> tuple[Floats, float]:
+        """What error is expected of somebody new, so far from the phone: as known, or if that is far off, any."""
+        anything = np.zeros(2), self.noise.place * OFF_STD_M**2
+        if self.off is None:
+            return anything
+        known = self.off.copy(), self.noise.place * _PRIOR_VAR
+        return min((known, anything), key=lambda one: float((apart - one[0]) @ (apart - one[0])) / one[1])
+
+    def odds(self, fit: PhoneFit) -> float:
+        """Of somebody, less what speaks against so sudden a change of the phone's error."""
+        if self.off is None or fit.off is None:
+            return fit.odds
+        changed = fit.off - self.off
+        return fit.odds - min(0.5 * float(changed @ changed) / (self.noise.place * _CHANGED_VAR), _CHANGED_MAX)
+
+
 class PhoneCheck:
     """Of one owner."""
 
     def __init__(self) -> None:
-        self._off: Floats | None = None  # [m] the phone's slow error, level
-        self._stray2 = _STRAY_M**2  # [m²] mean square of what it goes astray from that
-        self._doubts = 0
+        self._usual = Usual()
 
     def owner(self, phone: Floats) -> Floats | None:
         """Where a report puts the owner, level [m]; None: its error is not known yet."""
-        return None if self._off is None else phone[:2] - self._off
+        return None if self._usual.off is None else phone[:2] - self._usual.off
 
-    def hear(self, phone: Floats, seen: Floats, others: list[Floats], *, has_met_others: bool) -> tuple[Word, int]:
+    def hear(
+        self, phone: Floats, phone_vel: Floats | None, since_s: float, owner: Suitor | None,
+        others: Sequence[Suitor], *, has_met_others: bool,
+    ) -> tuple[Word, int]:  # fmt: skip
         """Takes in a report; what it says, and the index of whom it would rather be.
 
         Args:
-            phone: [m] where it puts the owner now.
-            seen: [m] where the owner is taken to be.
-            others: [m] where others are.
-            has_met_others: some may have been taken for the owner not long ago; without, nobody is doubted.
+            phone: [m] where it puts the owner now, north and east.
+            phone_vel: [m/s] north and east; None: it does not say.
+            since_s: the last report.
+            owner: who is taken for them; None: nobody.
+            others: who else is seen.
+            has_met_others: some may have been taken for the owner not long ago; without, nobody is doubted lightly.
         """
-        expected = self.owner(phone)
-        if expected is None:
-            self._off = phone[:2] - seen[:2]
-            return Word.AGREES, -1
-        off_m = float(np.hypot(*(seen[:2] - expected)))
-        others_m = [float(np.hypot(*(other[:2] - expected))) for other in others]
-        best = int(np.argmin(others_m)) if others_m else -1
-        astray_m = _STRAYS * max(self._stray2**0.5, _STRAY_M)
-        is_another = best >= 0 and off_m > max(_OFF_M, 0.5 * astray_m) and others_m[best] < off_m - _BETTER_M
-        if not has_met_others or not (is_another or off_m > max(_FAR_M, astray_m)):
-            self._doubts = 0
-            if not has_met_others:  # it might learn that of another
-                self._stray2 += _STEADY * (off_m * off_m - self._stray2)
-                self._off = (1.0 - _LEARNS) * (phone[:2] - expected) + _LEARNS * (phone[:2] - seen[:2])
-            return Word.AGREES, -1
-        self._doubts += 1
-        if self._doubts < _REPORTS:
-            return Word.AGREES, -1
-        self._doubts = 0
-        return (Word.ANOTHER, best) if is_another else (Word.NOBODY, -1)
+        everyone = [*others, *([owner] if owner is not None else [])]
+        last = None if owner is None else (owner[1].apart, owner[1].apart_vel)
+        for who, fit in everyone:
+            fit.hear(phone, phone_vel, who, since_s, self._usual)
+        over = max((fit.odds - _MOST for _, fit in everyone), default=0.0)
+        for _, fit in everyone:
+            fit.odds = max(fit.odds - max(over, 0.0), -_MOST)
+        odds = [self._usual.odds(fit) for _, fit in others]
+        best = max(range(len(others)), key=odds.__getitem__, default=-1)
+        is_heard = best >= 0 and others[best][1].reports >= _HEARD
+        if owner is None or last is None:
+            fits = has_met_others and is_heard and odds[best] > _FITS
+            return (Word.ANOTHER, best) if fits else (Word.AGREES, -1)
+        mine = self._usual.odds(owner[1])
+        self._learn(owner[1], *last)
+        if is_heard and odds[best] - max(mine, 0.0) > _SURE:
+            return Word.ANOTHER, best
+        is_nobody = mine < -(_SURE if has_met_others else _SURE_ALONE) and self._usual.noise.steps >= _KNOWN
+        return (Word.NOBODY if is_nobody else Word.AGREES), -1
+
+    def _learn(self, fit: PhoneFit, last: Floats | None, last_vel: Floats | None) -> None:
+        """The phone's noise, and its slow error if it fits."""
+        if last is not None and fit.apart is not None:
+            has_vel = last_vel is not None and fit.apart_vel is not None
+            step_vel = fit.apart_vel - last_vel if has_vel else None  # type: ignore[operator]
+            self._usual.noise.learn(fit.apart - last, step_vel)
+        if fit.off is not None and self._usual.odds(fit) > _FITS:
+            self._usual.off = fit.off.copy()

@@ -16,10 +16,11 @@ from policies.companion.observation import REPORT_LAG_S
 from policies.companion.owner_watch import OwnerWatch, sighting_from
 from policies.companion.senses.local_map import LocalMap
 from policies.companion.senses.other_people import OtherPeople
-from policies.companion.senses.phone_check import PhoneCheck, Word
+from policies.companion.senses.phone_check import PhoneCheck, PhoneFit, Word
 from policies.companion.senses.poses import Pose, PoseHistory
 from policies.companion.senses.seen_owner import PersonNow, SeenOwner
 from policies.companion.vehicle_link import Own, Owner
+from policies.mono_depth.network import MonoDepth
 from policies.person_detector.detector import Detection, PersonDetector
 
 Floats = NDArray[np.float64]
@@ -31,7 +32,7 @@ _GATE_MAX_M = 8.0
 _PHONE_GATE_M = 4.0  # at least, where they are expected by phone alone
 _COLOUR_GATE = 0.4  # and by this fraction of the range without depth
 _GONE_S = 1.0  # after so long without a sight
-_DOUBTED_US = 2_000_000  # for so long at least who turned out to be another was not the owner
+_DOUBTED_US = 5_000_000  # for so long at least who turned out to be another was not the owner: it is searched at once
 _MET_US = 20_000_000  # so long ago somebody else was there not long ago
 _STRANGE_S = 4.0  # and after so long anybody may be them
 _NEW_US = 1_000_000  # after so long with somebody in sight they are the owner, if nobody was so before
@@ -49,6 +50,7 @@ class Senses:
 
     def __init__(self, *, hears: bool = True, detector: PersonDetector | None = None) -> None:
         self._detector = detector or PersonDetector()
+        self._mono_depth = MonoDepth()
         self._hears = hears
         self.watch = OwnerWatch(hears=hears)
         """Where the owner is, by sights and phone."""
@@ -72,6 +74,8 @@ class Senses:
         self._row: list[Floats] = []  # where who may be the owner was in the last images
         self._others = OtherPeople()
         self._phone = PhoneCheck()
+        self._fit = PhoneFit()  # of who is taken for the owner
+        self._phone_us = 0  # of the last report
         self._phone_ned: Floats | None = None  # where it puts the owner, its error taken off
 
     def sense(self, own: Own, owner: Owner, image: ImageFrame | None) -> None:
@@ -100,30 +104,47 @@ class Senses:
             place = ned_of(seen.chest_hfrd, pose)
             self.bearing_rad = atan2(place[1] - pose.pos_ned[1], place[0] - pose.pos_ned[0])
             self.seen.see(place, pose, has_depth=seen.has_depth)
-        self.map.see(image.pixels, pose, self._owner_then(image.time_us, own), own.boot_us)
-        if seen is not None and not self.map.has_depth:
-            self.map.sight(pose, place, own.boot_us)
+        owner_then = self._owner_then(image.time_us, own)
+        self.map.see(image.pixels[..., 3], pose, owner_then, own.boot_us)
+        if not self.map.has_depth:
+            told = self._mono_depth.see(image.pixels, down, own.range_m * down[2])
+            self.map.guess(told, pose, owner_then, own.boot_us)
+            if seen is not None:
+                self.map.sight(pose, place, own.boot_us)
 
     def _check(self, own: Own, owner: Owner) -> None:
         """Asks a new report whether the owner is whom it takes for them."""
         if not self._hears or not isfinite(own.pos_ned[0]):
             return
-        phone = np.array(owner.pos_ned) + REPORT_LAG_S * np.array(owner.vel_ned)
+        phone_vel = np.array(owner.vel_ned[:2])
+        phone = np.array(owner.pos_ned[:2]) + REPORT_LAG_S * phone_vel
+        since_s, self._phone_us = max(own.boot_us - self._phone_us, 0) * 1e-6, own.boot_us
+        is_seen = self.silence_s(own) <= _GONE_S
+        word, index = self._phone.hear(
+            phone,
+            phone_vel if phone_vel.any() else None,
+            min(since_s, PHONE_OLD_S),
+            (self.seen.person_now(own.boot_us), self._fit) if is_seen else None,
+            self._others.heard(own.boot_us),
+            has_met_others=self._has_met_others(own.boot_us),
+        )
         expected = self._phone.owner(phone)
-        self._phone_ned = None if expected is None else np.array([*expected, phone[2]])
-        if self.silence_s(own) > _GONE_S:
+        self._phone_ned = None if expected is None else np.array([*expected, owner.pos_ned[2]])
+        if word is Word.AGREES:
             return
-        met_us = self._others.met_us
-        has_met_others = met_us is not None and own.boot_us - met_us < _MET_US
-        seen, others = self.seen.now(own.boot_us)[0], self._others.places(own.boot_us)
-        word, index = self._phone.hear(phone, seen, others, has_met_others=has_met_others)
+        former = (self.seen, self._fit) if is_seen else None
         if word is Word.ANOTHER:
-            self.seen = self._others.exchange(index, self.seen, own.boot_us)
+            self.seen, self._fit = self._others.exchange(index, former, own.boot_us)
             self.seen_us = self.seen.time_us
-        elif word is Word.NOBODY:
-            self.seen_us, self.seen = own.boot_us - _DOUBTED_US, SeenOwner()
-        if word is not Word.AGREES:
-            self.watch.forget()
+        elif former is not None:
+            self._others.add(*former, own.boot_us)
+            self.seen_us, self.seen, self._fit = own.boot_us - _DOUBTED_US, SeenOwner(), PhoneFit()
+        self.watch.forget()
+
+    def _has_met_others(self, now_us: int) -> bool:
+        """Some were there not long ago, and may have been taken for the owner."""
+        met_us = self._others.met_us
+        return met_us is not None and now_us - met_us < _MET_US
 
     def silence_s(self, own: Own) -> float:
         """Since the owner was seen."""
@@ -164,6 +185,10 @@ class Senses:
         is_gone = silence_s > _GONE_S
         expected, gate_m = self._expected(pose.time_us, silence_s)
         places = [ned_of(detection.chest_hfrd, pose) for detection in found]
+        if is_gone and self.is_heard and self._has_met_others(pose.time_us):  # the phone says who of them it is
+            new = [places[k] for k in self._others.left(places, None, pose)]
+            self._others.meet(new, None, pose)
+            return None
         if silence_s > _STRANGE_S:  # or nobody was the owner before
             self._others.forget()
         kept = self._others.left(places, None if is_gone else expected, pose, self.seen_us if is_gone else None)
