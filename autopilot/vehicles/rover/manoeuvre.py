@@ -33,7 +33,10 @@ _PER_ATTEMPT_M = wp.constant(0.1)  # by which each change of direction makes the
 class PathState:
     """What is remembered of the way to a place."""
 
-    pos_ned: wp.vec2  # [m] the place; a change of it is a new way
+    pos_ned: wp.vec2  # [m] the place driven to or held: the one asked for, moved along with the estimate's wander
+    asked_ned: wp.vec2  # [m] the place asked for; a change of it is a new way
+    here_ned: wp.vec2  # [m] the vehicle a step before
+    wander_m: float  # of the estimate while the vehicle stands, at most
     start_ned: wp.vec2  # [m] where the line to it begins
     has_place: int
     phase: int  # autopilot.vehicles.rover.path

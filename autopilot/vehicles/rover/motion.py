@@ -20,7 +20,9 @@ class Measured:
     yaw: float  # [rad]
     speed: float  # [m/s] along the nose
     side_speed: float  # [m/s] of the rear axle, to the right
+    ground_speed: float  # [m/s] in any horizontal direction
     yaw_rate: float  # [rad/s]
+    pos_std: float  # [m] horizontal
 
 
 @wp.struct
@@ -46,7 +48,9 @@ def measured(airframe: RoverControlAirframe, est: Estimate, yaw_rate: float) -> 
     now.axle_ned = now.pos_ned - airframe.rear_m * now.ahead_ned
     now.speed = wp.dot(est.vel_ned, now.nose_ned)
     now.side_speed = now.ahead_ned[0] * est.vel_ned[1] - now.ahead_ned[1] * est.vel_ned[0] - airframe.rear_m * yaw_rate
+    now.ground_speed = wp.length(wp.vec2(est.vel_ned[0], est.vel_ned[1]))
     now.yaw_rate = yaw_rate
+    now.pos_std = est.pos_h_std
     return now
 
 

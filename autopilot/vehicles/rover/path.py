@@ -5,6 +5,9 @@ line: it goes where the nose points, forward as well as backwards. Its course cl
 (line of sight guidance, T. I. Fossen, "Handbook of Marine Craft Hydrodynamics and Motion Control", 2011, section 12.3),
 with the turning of that course fed forward, and less what the vehicle crabs.
 
+A vehicle that stands does not follow its position estimate, which wanders by metres while nothing moves: what the
+estimate moves without speed moves the place held, too. What rolls or slides has a speed, and is driven back.
+
 A rover cannot go sideways: a place beside it that the front wheels cannot reach is backed away from first
 (autopilot.vehicles.rover.manoeuvre), and one a little off is left so once the rover stands.
 """
@@ -24,6 +27,7 @@ wp.set_module_options({"enable_backward": False})
 _DRIVING = wp.constant(0)  # PathState.phase, along the line
 _HOLDING = wp.constant(1)  # stands at the place
 _MANOEUVRING = wp.constant(2)  # to a place near by, by whichever end
+_WANDER_SIGMA = wp.constant(5.0)  # guess: the estimate wanders by less; more is a creep below the standstill speed
 _SAME_M = wp.constant(0.001)  # by which a place must differ to be another one
 _LINE_M = wp.constant(0.1)  # least length of a line that has a direction
 _RUN_OUT_M = wp.constant(2.0)  # behind a place to be passed, by which nobody has asked for another one
@@ -47,6 +51,8 @@ def begin_way(
     """A new place: the line to it begins where the setpoint says, or here."""
     now = PathState()
     now.pos_ned = wp.vec2(sp.pos_ned[0], sp.pos_ned[1])
+    now.asked_ned = now.pos_ned
+    now.here_ned = here.pos_ned
     now.has_place = 1
     now.crab = state.crab
     now.asked_direction = asked_direction(sp)
@@ -57,8 +63,26 @@ def begin_way(
         now.start_ned = wp.vec2(sp.path_start_ned[0], sp.path_start_ned[1])
     elif sp.exit_speed <= 0.0 and not wp.isfinite(sp.vel_ned[0]) and distance < near_m(params, airframe):
         now.phase = _MANOEUVRING
-    if state.phase == _HOLDING and distance < 0.5 * params.hold_radius:
+    stands = state.phase == _HOLDING or (now.phase == _MANOEUVRING and here.ground_speed < params.stop_speed)
+    if stands and distance < 0.5 * params.hold_radius:
         now.phase = _HOLDING
+    return now
+
+
+@wp.func
+def place_held(params: RoverParams, state: PathState, here: Measured) -> PathState:
+    """The state with the place of a vehicle that stands, a step later.
+
+    It moves with the estimate as far as that may wander: by its deviation since the vehicle stands, at its largest. An
+    estimate without any, the truth, moves nothing.
+    """
+    now = state
+    now.here_ned = here.pos_ned
+    if state.phase == _HOLDING and here.ground_speed < params.stop_speed:
+        now.wander_m = wp.max(state.wander_m, _WANDER_SIGMA * here.pos_std)
+        now.pos_ned = state.pos_ned + here.pos_ned - state.here_ned
+        if not (wp.length(now.pos_ned - state.asked_ned) <= now.wander_m):  # NaN, too
+            now.pos_ned = state.asked_ned
     return now
 
 
@@ -180,8 +204,9 @@ def follow_path(
     now = state
     place = wp.vec2(sp.pos_ned[0], sp.pos_ned[1])
     is_same_way = state.has_place == 1 and state.asked_direction == asked_direction(sp)
-    if not is_same_way or wp.length(place - state.pos_ned) > _SAME_M:
+    if not is_same_way or wp.length(place - state.asked_ned) > _SAME_M:
         now = begin_way(params, airframe, state, here, sp)
+    now = place_held(params, now, here)
     now.crab = crab_step(now, here, dt_s)
     way_m = way_left(now, here)
     now = next_phase(params, airframe, now, here, sp, way_m)

@@ -2,8 +2,9 @@
 
 from math import hypot
 
+from autopilot.interface.client_requests import GoTo
 from autopilot.interface.mode_spec import FlightMode
-from autopilot.interface.vehicle_state import Mode, Severity
+from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Severity
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.fence.fence import Fence
 from autopilot.navigator.modes.hold import Hold
@@ -16,13 +17,31 @@ _STANDING_M_S = 0.1
 
 
 class RoverHold(Hold):
-    """Mode Hold: stands where it can stop, or at a place that it was sent to. Without a position it stands braked."""
+    """Mode Hold: stops and stands there, or at a place that it was sent to. Without a position it stands braked.
 
-    __slots__ = ("_is_blind",)
+    Where it comes to stand is known once it does: a car in a turn, or one whose wheels slip, stops nowhere near the
+    place that its speed points at, and would have to drive there.
+    """
+
+    __slots__ = ("_is_blind", "_is_stopping")
 
     def __init__(self, context: NavContext) -> None:
         super().__init__(context, steered=Position(context))
         self._is_blind = False
+        self._is_stopping = False
+
+    def take(self, request: GoTo) -> Reply:
+        reply = super().take(request)
+        if request.is_pause and reply is ACCEPTED:
+            self._context.next_hold = None
+        return reply
+
+    def start(self) -> None:
+        self._is_stopping = self._context.next_hold is None
+        super().start()
+        if self._is_stopping:
+            self._is_flown = True
+            self._context.setpoint.drive(speed=0.0, yaw_rate=0.0)
 
     def frame(self) -> None:
         context = self._context
@@ -34,6 +53,23 @@ class RoverHold(Hold):
             self._is_blind = False
             self.start()
         super().frame()
+        if self._is_stopping and not self._is_steered:
+            self._stop()
+
+    def _stop(self) -> None:
+        """Chooses the place to hold, once it stands."""
+        context = self._context
+        vel_north, vel_east, _ = context.state.estimate.vel_ned
+        if hypot(vel_north, vel_east) < _STANDING_M_S:
+            self._is_stopping = False
+            self.target_ned, self.yaw = context.state.estimate.pos_ned, context.state.yaw_rad
+            context.fly_to(self.target_ned, self.yaw)
+
+    def _follow_reset(self) -> None:
+        if self._is_goto:
+            super()._follow_reset()
+        else:
+            self.start()
 
 
 class RoverLoiter(RoverHold):

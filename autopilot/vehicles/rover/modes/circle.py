@@ -101,7 +101,7 @@ class RoverOrbit(FlightMode):
             self._turned += self._direction * wrapped(bearing - self._bearing)
         self._bearing = bearing
         if 0.0 < self._turns <= self._turned:
-            context.hold_next(context.stop_point(), context.state.yaw_rad)
+            context.wish = Mode.HOLD
             return
         course = bearing + self._direction * (0.5 * pi + atan(off_m / reach_m))
         rate = self._direction * self._speed / max(distance_m, self._radius_m) if abs(off_m) < reach_m else 0.0

@@ -143,6 +143,19 @@ def test_a_rover_pushed_away_drives_back_and_stands():
     assert np.abs(track.speed[:, 3]).max() < 0.05  # within what is held: it stays
 
 
+def test_a_rover_that_stands_does_not_drive_after_its_estimate():
+    """Each row has noise of its own; some of them wander by more than what is held."""
+    rig = RoverRig(8, has_estimator=True)
+    estimate = rig.rig.rows["autopilot.ekf.rows"]["estimate"]
+    begins = estimate["pos_ned"][:, :2].copy()
+    for port, place in zip(rig.ports, begins, strict=True):
+        to(port, *place)
+    wandered = []
+    rig.run(3000, lambda _rig, _frame: wandered.append(np.linalg.norm(estimate["pos_ned"][:, :2] - begins, axis=1)))
+    assert np.max(wandered) > rig.table["HG_RO_HOLD_RAD"]
+    assert np.abs(rig.track().speed).max() < 0.05
+
+
 def test_disarmed_the_motor_is_off_and_the_brake_on():
     rig = RoverRig(1)
     rig.ports[0].drive(speed=2.0, yaw=0.0)
