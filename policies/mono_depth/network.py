@@ -90,14 +90,15 @@ class MonoDepth:
             down_frd: the unit vector down in the body frame.
             height_m: of the lens above the ground; NaN: not known.
         """
-        ground = flat_ground(np.array(rotated(inverse(camera_mount()), down_frd))[None], np.array([height_m]))
+        down_rdf = rotated(inverse(camera_mount()), down_frd)
         with torch.inference_mode():
-            logits = self._network(torch.tensor(pixels[None, ..., :3]), torch.from_numpy(ground))[0].numpy()
+            ground = flat_ground(torch.tensor([down_rdf]), torch.tensor([height_m]))
+            logits = self._network(torch.tensor(pixels[None, ..., :3]), ground)[0].numpy()
         is_person = logits[BINS] > np.log(_SOMEBODY / (1.0 - _SOMEBODY))
         return SeenDepth(_full(quantile_byte(logits[:BINS])), _full(is_person))
 
 
-def flat_ground(down_rdf: NDArray[np.float64], height_m: NDArray[np.float64]) -> NDArray[np.float32]:
+def flat_ground(down_rdf: Tensor, height_m: Tensor) -> Tensor:
     """Where level ground would be seen: 0 at the lens, 1/2 at 4 m, 1 from the horizon up, and if no height is known.
 
     Args:
@@ -105,13 +106,13 @@ def flat_ground(down_rdf: NDArray[np.float64], height_m: NDArray[np.float64]) ->
         height_m: of the lens above the ground, (n,); NaN: not known.
     """
     half = float(np.tan(np.radians(0.5 * HFOV_DEG)))
-    steps = (np.arange(IMAGE_SIZE) + 0.5 - 0.5 * IMAGE_SIZE) * (2.0 * half / IMAGE_SIZE)
+    steps = (torch.arange(IMAGE_SIZE, device=down_rdf.device) + 0.5 - 0.5 * IMAGE_SIZE) * (2.0 * half / IMAGE_SIZE)
     right, down, ahead = down_rdf.T[:, :, None, None]
     sinks = right * steps[None, None, :] + down * steps[None, :, None] + ahead  # of a ray of depth 1
     height = height_m[:, None, None]
-    is_ground = (sinks > 0.0) & np.isfinite(height)
-    shown = height / (height + float(DEPTH_HALF_M) * np.where(is_ground, sinks, 1.0))
-    return np.where(is_ground, shown, 1.0).astype(np.float32)
+    is_ground = (sinks > 0.0) & torch.isfinite(height)
+    shown = height / (height + float(DEPTH_HALF_M) * torch.where(is_ground, sinks, 1.0))
+    return torch.where(is_ground, shown, 1.0)
 
 
 def quantile_byte(logits: NDArray[np.float32], quantile: float = _QUANTILE) -> NDArray[np.uint8]:

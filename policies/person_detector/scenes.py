@@ -12,6 +12,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.attitude import inverse, product, quat_of_roll_pitch_yaw, rotated
+from common.warp_start import start_warp
 from policies.person_detector.detector import CELLS, RANGE_M, STRIDE
 from policies.tasks.follow_me.cast import PEOPLE_MAX
 from policies.tasks.follow_me.observe import HFOV_DEG, IMAGE_SIZE, camera_mount, pack_images
@@ -75,40 +76,49 @@ class Stage:
     Args:
         seed: of everything.
         is_test: in worlds that no other split has.
+        count: of vehicles and worlds.
+        device: a Warp device.
     """
 
-    def __init__(self, seed: int, *, is_test: bool = False) -> None:
+    def __init__(self, seed: int, *, is_test: bool = False, count: int = WORLDS, device: str = "cpu") -> None:
         self.rng = np.random.default_rng([seed, int(is_test)])
+        self.count = count
         self._is_test, self._turns = is_test, 0
-        self._worlds = WorldBatch(FOLLOW_WORLD, WORLDS, trees_per_ha_max=300.0)
-        self._people = wp.zeros((WORLDS, PEOPLE_MAX), dtype=Person)
-        self._clothes = wp.zeros((WORLDS, PEOPLE_MAX), dtype=Clothes)
-        size: dict[str, Any] = {"width": IMAGE_SIZE, "height": IMAGE_SIZE, "hfov_deg": HFOV_DEG, "has_optics": True}
-        self.camera = QuickCamera(self._worlds, WORLDS, **size, people=self._people, clothes=self._clothes)
-        self._everyone = wp.full(WORLDS, value=True, dtype=wp.bool)
-        self._packed = wp.zeros((WORLDS, IMAGE_SIZE, IMAGE_SIZE, 4), dtype=wp.uint8)
-        self.height_m = np.zeros(WORLDS)
+        start_warp()  # makes the CPU the default, once
+        with wp.ScopedDevice(device):
+            self._worlds = WorldBatch(FOLLOW_WORLD, count, device, trees_per_ha_max=300.0)
+            self._people = wp.zeros((count, PEOPLE_MAX), dtype=Person)
+            self._clothes = wp.zeros((count, PEOPLE_MAX), dtype=Clothes)
+            size: dict[str, Any] = {"width": IMAGE_SIZE, "height": IMAGE_SIZE, "hfov_deg": HFOV_DEG}
+            who = {"people": self._people, "clothes": self._clothes}
+            self.camera = QuickCamera(self._worlds, count, **size, **who, has_optics=True, device=device)
+            self._everyone = wp.full(count, value=True, dtype=wp.bool)
+            self._packed = wp.zeros((count, IMAGE_SIZE, IMAGE_SIZE, 4), dtype=wp.uint8)
+        self._device = device
+        self.height_m = np.zeros(count)
         """Of the lenses above the ground below them."""
 
     @property
     def people(self) -> Any:
-        """Who is there, (WORLDS, PEOPLE_MAX) of `Person`."""
+        """Who is there, (count, PEOPLE_MAX) of `Person`."""
         return self._people.numpy()
 
     def place(self) -> None:
         """Everybody is somewhere else; from time to time in other worlds."""
-        if self._turns % _ROUNDS == 0:
-            _grow(self._worlds, self.rng, is_test=self._is_test)
-            self.camera.refresh()
-        self._turns += 1
-        self.height_m = _place(self._worlds, self.camera, self._people, self._clothes, self.rng)
+        with wp.ScopedDevice(self._device):
+            if self._turns % _ROUNDS == 0:
+                _grow(self._worlds, self.rng, is_test=self._is_test)
+                self.camera.refresh()
+            self._turns += 1
+            self.height_m = _place(self._worlds, self.camera, self._people, self._clothes, self.rng)
 
     def images(self) -> NDArray[np.uint8]:
-        """What the cameras see, as a companion gets it: (WORLDS, height, width, 4)."""
-        self.camera.render()
-        inputs = [self.camera.rgb, self.camera.depth_m, self._everyone, self._packed]
-        wp.launch(pack_images, (WORLDS, IMAGE_SIZE), inputs)
-        return np.asarray(self._packed.numpy().copy())
+        """What the cameras see, as a companion gets it: (count, height, width, 4)."""
+        with wp.ScopedDevice(self._device):
+            self.camera.render()
+            inputs = [self.camera.rgb, self.camera.depth_m, self._everyone, self._packed]
+            wp.launch(pack_images, (self.count, IMAGE_SIZE), inputs)
+            return np.asarray(self._packed.numpy().copy())
 
 
 def scenes(count: int, seed: int, *, is_test: bool = False) -> Scenes:
@@ -123,17 +133,19 @@ def scenes(count: int, seed: int, *, is_test: bool = False) -> Scenes:
 
 def _grow(worlds: WorldBatch, rng: np.random.Generator, *, is_test: bool) -> None:
     params: Any = worlds.params.numpy()
-    params["hill_height_m"] = rng.uniform(2.0, 12.0, WORLDS)
-    params["trees_per_ha"] = rng.uniform(30.0, 250.0, WORLDS)
-    seeds = 2 * rng.integers(2**29, size=WORLDS) + int(is_test)
-    worlds.grow(wp.full(WORLDS, value=True, dtype=wp.bool), wp.array(seeds, dtype=int))
+    n = len(params)
+    params["hill_height_m"] = rng.uniform(2.0, 12.0, n)
+    params["trees_per_ha"] = rng.uniform(30.0, 250.0, n)
+    worlds.params.assign(params)
+    seeds = 2 * rng.integers(2**29, size=n) + int(is_test)
+    worlds.grow(wp.full(n, value=True, dtype=wp.bool), wp.array(seeds, dtype=int))
 
 
 def _place(
     worlds: WorldBatch, camera: QuickCamera, people: Any, clothes: Any, rng: np.random.Generator
 ) -> NDArray[np.float64]:
     """Puts vehicles into their worlds, people before them, and the light and the lens on: their heights [m]."""
-    n, k = WORLDS, PEOPLE_MAX
+    n, k = people.shape
     spread_m = np.where(rng.random(n) < _AT_HOME, _HOME_M, _SPREAD_M)[:, None]
     where = spread_m * rng.uniform(-1.0, 1.0, (n, 2))
     yaw = rng.uniform(-np.pi, np.pi, n)
@@ -153,6 +165,7 @@ def _place(
     row["gait_phase"] = rng.uniform(0.0, 2.0 * np.pi, (n, k))
     row["vel_ned"] = 0.0
     row["vel_ned"][..., 0] = rng.uniform(0.0, 5.0, (n, k)) * (rng.random((n, k)) < 0.8)
+    people.assign(row)
     is_usual = wp.array((rng.random((n, k)) < 0.15).astype(np.int32), dtype=int)
     wp.launch(_dress, (n, k), [int(rng.integers(2**31)), is_usual, usual_clothes(), clothes])
     height_m = rng.uniform(0.6, 4.0, n)
@@ -163,8 +176,8 @@ def _place(
 def _aim(
     camera: QuickCamera, rng: np.random.Generator, where: Any, down: NDArray[np.float64], yaw: NDArray[np.float64]
 ) -> None:
-    n = WORLDS
     lens: Any = camera.lenses.numpy()
+    n = len(lens)
     lens["pos_ned"] = np.concatenate([where, down[:, None]], -1)
     lean = [rng.normal(0.0, 0.15, n), rng.normal(-0.05, 0.2, n)]  # roll and pitch [rad]
     mount = camera_mount()
@@ -185,6 +198,8 @@ def _aim(
     optics["vel_rdf"] = rng.normal(0.0, 2.0, (n, 3))
     optics["rate_rdf"] = rng.normal(0.0, 0.6, (n, 3))
     optics["seed"], optics["tick"] = rng.integers(2**30, size=n), rng.integers(2**30, size=n)
+    camera.lenses.assign(lens)
+    camera.optics.assign(optics)
 
 
 def _labels(camera: QuickCamera, people: Any) -> tuple[NDArray[np.int8], NDArray[np.float32]]:

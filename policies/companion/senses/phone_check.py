@@ -165,8 +165,9 @@ class PhoneCheck:
         for who, fit in everyone:
             fit.hear(phone, phone_vel, who, since_s, self._usual)
         over = max((fit.odds - _MOST for _, fit in everyone), default=0.0)
+        least = -_MOST if self._usual.noise.steps >= _KNOWN else 0.0  # nobody is doubted before
         for _, fit in everyone:
-            fit.odds = max(fit.odds - max(over, 0.0), -_MOST)
+            fit.odds = max(fit.odds - max(over, 0.0), least)
         odds = [self._usual.odds(fit) for _, fit in others]
         best = max(range(len(others)), key=odds.__getitem__, default=-1)
         is_heard = best >= 0 and others[best][1].reports >= _HEARD
@@ -177,7 +178,7 @@ class PhoneCheck:
         self._learn(owner[1], *last)
         if is_heard and odds[best] - max(mine, 0.0) > _SURE:
             return Word.ANOTHER, best
-        is_nobody = mine < -(_SURE if has_met_others else _SURE_ALONE) and self._usual.noise.steps >= _KNOWN
+        is_nobody = mine < -(_SURE if has_met_others else _SURE_ALONE)
         return (Word.NOBODY if is_nobody else Word.AGREES), -1
 
     def _learn(self, fit: PhoneFit, last: Floats | None, last_vel: Floats | None) -> None:

@@ -6,6 +6,7 @@ import pytest
 from common.attitude import Vector
 from policies.companion.senses.local_map import CELL_M, LocalMap
 from policies.companion.senses.poses import Pose
+from policies.mono_depth.network import SeenDepth
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, IMAGE_SIZE
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)
@@ -16,10 +17,8 @@ NORTH, SOUTH = (1.0, 0.0), (-1.0, 0.0)
 
 def picture(depth_m: float | None) -> np.ndarray:
     """All at one depth along the optical axis; None: no returns."""
-    pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 255, np.uint8)
-    if depth_m is not None:
-        pixels[..., 3] = int(255.0 * depth_m / (depth_m + float(DEPTH_HALF_M)))
-    return pixels
+    byte = 255 if depth_m is None else int(255.0 * depth_m / (depth_m + float(DEPTH_HALF_M)))
+    return np.full((IMAGE_SIZE, IMAGE_SIZE), byte, np.uint8)
 
 
 def way_m(seen: LocalMap, pos_ned: Vector, way: tuple[float, float], now_us: int = 0) -> tuple[float, float]:
@@ -116,3 +115,15 @@ def test_what_is_solid_is_told_by_sectors_from_the_heading() -> None:
     assert np.isinf(near_m[12])
     turned = seen.nearest_m(HERE, np.pi / 2, 0)  # it is to the left now
     assert turned[18] == pytest.approx(5.0, abs=2 * CELL_M)
+
+
+def test_depth_told_from_colours_leaves_people_out_but_does_not_look_through_them() -> None:
+    seen, somebody = LocalMap(), np.zeros((IMAGE_SIZE, IMAGE_SIZE), bool)
+    seen.guess(SeenDepth(picture(3.0), somebody), POSE, None, 0)
+    assert way_m(seen, HERE, NORTH)[1] == pytest.approx(3.0, abs=2.5 * CELL_M)
+    assert not seen.has_depth
+    seen = LocalMap()
+    seen.guess(SeenDepth(picture(3.0), ~somebody), POSE, None, 0)
+    free_m, known_m = way_m(seen, HERE, NORTH)
+    assert known_m > 9.0
+    assert free_m == pytest.approx(3.0, abs=2.5 * CELL_M)

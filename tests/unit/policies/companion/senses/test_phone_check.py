@@ -1,37 +1,93 @@
 """What the phone says of whom is taken for the owner."""
 
+from collections.abc import Callable
+
 import numpy as np
+import pytest
 
-from policies.companion.senses.phone_check import PhoneCheck, Word
+from policies.companion.senses.phone_check import PhoneCheck, PhoneFit, Word
+from policies.companion.senses.seen_owner import PersonNow
 
-HERE, AWAY = np.array([2.0, 0.0, -1.0]), np.array([-3.0, 4.0, -1.0])
-OFF = np.array([1.5, -1.0, 0.0])  # the phone's slow error
-
-
-def learned() -> PhoneCheck:
-    check = PhoneCheck()
-    for _ in range(20):
-        assert check.hear(HERE + OFF, HERE, [AWAY], has_met_others=True)[0] is Word.AGREES
-    return check
+OFF = np.array([1.5, -1.0])  # [m] the phone's slow error
+STEP_S = 0.5
+Walk = Callable[[float], tuple[float, float]]
 
 
-def words(check: PhoneCheck, phone: np.ndarray, seen: np.ndarray, others: list, times: int, *, met: bool) -> list[Word]:
-    return [check.hear(phone, seen, others, has_met_others=met)[0] for _ in range(times)]
+def north(t: float) -> tuple[float, float]:
+    return (1.3 * t, 0.0)
 
 
-def test_who_fits_the_phone_better_for_some_reports_is_the_owner() -> None:
-    assert words(learned(), HERE + OFF, AWAY, [HERE], 3, met=True) == [Word.AGREES, Word.AGREES, Word.ANOTHER]
+def east(t: float) -> tuple[float, float]:
+    return (0.0, 1.3 * t + 2.0)
 
 
-def test_who_is_far_from_the_phone_where_others_were_is_not_the_owner() -> None:
-    assert words(learned(), HERE + OFF, AWAY, [], 3, met=True)[-1] is Word.NOBODY
+def beside(t: float) -> tuple[float, float]:
+    return (1.3 * t + 1.0, 1.5)
 
 
-def test_a_phone_alone_makes_nobody_doubt() -> None:
-    assert set(words(learned(), HERE + OFF, AWAY, [], 10, met=False)) == {Word.AGREES}
+def person(walk: Walk, t: float) -> PersonNow:
+    place, then = np.array(walk(t)), np.array(walk(t - 0.01))
+    return PersonNow(np.array([*place, -1.0]), (place - then) / 0.01, 0.05 * np.eye(2), 0.0)
+
+
+class Talk:
+    """A phone in somebody's pocket, a report each half second, with its usual noise or more."""
+
+    def __init__(self, has_phone: Walk, noise: float = 1.0) -> None:
+        self.check, self.rng = PhoneCheck(), np.random.default_rng(5)
+        self.has_phone, self.noise, self.t = has_phone, noise, 0.0
+        self.fits: dict[Walk, PhoneFit] = {}
+
+    def hear(self, owner: Walk | None, *others: Walk, met: bool = True, has_vel: bool = True) -> tuple[Word, int]:
+        self.t += STEP_S
+        who = person(self.has_phone, self.t)
+        phone = who.pos_ned[:2] + self.noise * OFF + self.rng.normal(0.0, 0.3 * self.noise, 2)
+        vel = who.vel + self.rng.normal(0.0, 0.2 * self.noise, 2)
+        known = [(person(walk, self.t), self.fits.setdefault(walk, PhoneFit())) for walk in (owner, *others) if walk]
+        first, rest = (known[0], known[1:]) if owner else (None, known)
+        return self.check.hear(phone, vel if has_vel else None, STEP_S, first, rest, has_met_others=met)
+
+    def words(
+        self, owner: Walk | None, *others: Walk, times: int, met: bool = True, has_vel: bool = True
+    ) -> list[Word]:
+        return [self.hear(owner, *others, met=met, has_vel=has_vel)[0] for _ in range(times)]
+
+
+@pytest.mark.parametrize("has_vel", [True, False])
+def test_who_goes_as_the_phone_says_is_the_owner(has_vel: bool) -> None:
+    assert Word.ANOTHER in Talk(north).words(east, north, times=12, has_vel=has_vel)
+    assert set(Talk(north).words(north, east, times=60, has_vel=has_vel)) == {Word.AGREES}
+
+
+def test_who_goes_another_way_is_not_the_owner_though_nobody_else_is_seen() -> None:
+    talk = Talk(north)
+    assert set(talk.words(north, times=10, met=False)) == {Word.AGREES}
+    assert Word.NOBODY in talk.words(east, times=20, met=False)
+
+
+@pytest.mark.parametrize("noise", [1.0, 4.0])
+def test_an_owner_alone_is_not_doubted_however_bad_the_phone(noise: float) -> None:
+    assert set(Talk(north, noise).words(north, times=120, met=False)) == {Word.AGREES}
+
+
+def test_who_is_not_known_is_the_owner_after_reports_that_fit_and_others_are_not() -> None:
+    talk = Talk(north)
+    talk.words(north, times=20)
+    talk.fits.clear()
+    assert set(talk.words(None, east, times=10)) == {Word.AGREES}
+    talk.fits.clear()
+    said = [talk.hear(None, east, north) for _ in range(6)]
+    assert (Word.ANOTHER, 1) in said
+    assert (Word.ANOTHER, 0) not in said
+
+
+def test_who_walks_beside_the_owner_is_not_preferred() -> None:
+    assert set(Talk(north).words(north, beside, times=60)) == {Word.AGREES}
 
 
 def test_its_slow_error_is_learned() -> None:
-    owner = learned().owner(HERE + OFF)
+    talk = Talk(north)
+    talk.words(north, times=30)
+    owner = talk.check.owner(np.array(north(talk.t)) + OFF)
     assert owner is not None
-    assert np.hypot(*(owner - HERE[:2])) < 1e-6
+    assert np.hypot(*(owner - np.array(north(talk.t)))) < 0.5
