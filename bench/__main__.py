@@ -30,6 +30,7 @@ SCRIPTS = {
     "links": "bench.flying.links",
     "scaling": "bench.flying.scaling",
     "worlds": "bench.flying.worlds",
+    "scenarios": "bench.flying.scenarios",
     "hover": "bench.learning.hover",
     "environments": "bench.learning.environments",
     "training": "bench.learning.training",

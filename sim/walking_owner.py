@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from common.kernels import TICK_US
 from sim.sensors.phone import PhoneModel, PhoneState, phone_model, phone_start, phone_step
@@ -59,7 +60,6 @@ class Owner:
         seed: of the walks and of the phones.
         model: how they move.
         phone: how good their phones are.
-        device: of the arrays; the world must be there too.
     """
 
     def __init__(
@@ -70,23 +70,17 @@ class Owner:
         *,
         model: Any = None,
         phone: Any = None,
-        device: str = "cpu",
     ) -> None:
         start = np.asarray(positions, np.float32).reshape(-1, 3)
-        self.people = wp.zeros(len(start), dtype=Person, device=device)
-        self.phones = wp.zeros(len(start), dtype=PhoneState, device=device)
-        self._device = device
-        self._given = [world.kernel, model or person_model(), phone or phone_model()]
-        self._seed = seed
+        self.people = wp.zeros(len(start), dtype=Person)
+        self.phones = wp.zeros(len(start), dtype=PhoneState)
         self._tick = 0
-        positions_array = wp.array(start, dtype=wp.vec3, device=device)
-        wp.launch(
-            _start,
-            dim=len(start),
-            inputs=[*self._given, positions_array, seed],
-            outputs=[self.people, self.phones],
-            device=device,
-        )
+        given = [world.kernel, model or person_model(), phone or phone_model()]
+        wp.launch(_start, len(start), [*given, wp.array(start, dtype=wp.vec3), seed, self.people, self.phones])
+        inputs = [*given, seed, self._tick, self.people, self.phones]
+        self._step = wp.launch(_step, len(start), inputs, record_cmd=True)
+        self._world = world  # recorded launches do not keep it
+        self._has_report: NDArray[np.int32] = self.phones.numpy()["fix"]["is_new"]  # live
 
     @property
     def time_us(self) -> int:
@@ -95,19 +89,14 @@ class Owner:
 
     def change_model(self, model: Any) -> None:
         """They move by another model from the next plan on: a person who waited sets off."""
-        self._given[1] = model
+        self._step.set_param_at_index(1, model)
 
     def step_to(self, tick: int) -> bool:
         """Moves on to the last multiple of PERSON_TICKS at or before a tick; true if a phone reported on the way."""
         has_report = False
         while self._tick + PERSON_TICKS <= tick:
             self._tick += PERSON_TICKS
-            wp.launch(
-                _step,
-                dim=len(self.people),
-                inputs=[*self._given, self._seed, self._tick],
-                outputs=[self.people, self.phones],
-                device=self._device,
-            )
-            has_report = has_report or bool(self.phones.numpy()["fix"]["is_new"].any())
+            self._step.set_param_at_index_from_ctype(4, self._tick)
+            self._step.launch()
+            has_report = has_report or any(self._has_report.tolist())
         return has_report

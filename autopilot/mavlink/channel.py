@@ -216,8 +216,9 @@ class Endpoint:
         """Sends the telemetry that is due; the frame log gets the first channel's."""
         state = self.vehicle.state
         log, needs_ticks = self._log, False
+        built: dict[int, bytes | None] = {}
         for channel in self.channels:
-            messages = channel.schedule.due(self.time_us, state)
+            messages = channel.schedule.due(self.time_us, state, built)
             if self.clock.boot_us:
                 messages = [(kind, self._on_clients_clock(kind, payload)) for kind, payload in messages]
             frames = channel.send_all(messages)

@@ -53,6 +53,11 @@ def sentence(error: ErrorDetails, model: type[BaseModel]) -> str:
     return f"must be {wanted}, not {shown(error['input'])}" if wanted else error["msg"][0].lower() + error["msg"][1:]
 
 
+def faulty_path(error: ErrorDetails) -> tuple[int | str, ...]:
+    """The path of the value that is wrong, or of the key that is: pydantic's mark of a key is left out."""
+    return tuple(step for step in error["loc"] if step != "[key]")
+
+
 def unknown_key(key: str, known_keys: Iterable[str]) -> str:
     """The sentence about a key that does not exist."""
     meant = nearest(key, known_keys)

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from common.config.refusal import sentence
+from common.config.refusal import faulty_path, sentence
 from mission.campaign.campaign import SEED_KEY
 from mission.campaign.distributions import Value
 from mission.scenario.scenario import Scenario
@@ -32,7 +32,7 @@ def varied(scenario: Scenario, values: Mapping[str, Value]) -> Scenario:
         return Scenario.model_validate(given)
     except ValidationError as error:
         first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
+        where = ".".join(str(part) for part in faulty_path(first))
         raise KeyFault(f"the scenario cannot be so: {where}: {sentence(first, Scenario)}") from error
 
 

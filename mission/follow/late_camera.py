@@ -28,7 +28,6 @@ class LateCamera:
         self._delay_s: Any = wp.zeros(1, dtype=float)
         self._inputs = [params, seed, 0, self._delay_s]
         self._under_way: deque[tuple[int, ImageFrame]] = deque()
-        self._count = 0
         self.sinks: list[Sink] = []
 
     def add_sink(self, sink: Sink) -> None:
@@ -36,9 +35,8 @@ class LateCamera:
         self.sinks.append(sink)
 
     def publish(self, frame: ImageFrame) -> None:
-        """Called by the camera."""
-        self._inputs[2] = self._count
-        self._count += 1
+        """Called by the camera; what becomes of a picture goes by its number, the first is 1."""
+        self._inputs[2] = frame.sequence - 1
         wp.launch(delay_rows, 1, self._inputs)
         delay_s = float(np.asarray(self._delay_s.numpy())[0])
         if delay_s >= 0.0:

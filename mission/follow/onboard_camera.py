@@ -4,6 +4,7 @@ In: the true pose of the vehicle, and the people. Out: pictures of 64 x 64 pixel
 packed as in training, to whoever asked for them: a companion in the same process, or a server of streams.
 """
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ PERIOD_US = 100_000
 
 
 class OnboardCamera:
-    """The forward camera of vehicle 0 of a rig.
+    """The forward camera of vehicle 0 of a rig; it renders from when somebody gets its pictures.
 
     Args:
         rig: where the truth is.
@@ -44,6 +45,35 @@ class OnboardCamera:
     q_frd_from_rdf, hfov_deg = camera_mount(), HFOV_DEG
 
     def __init__(self, rig: Rig, world: WorldMap, cast: FlownCast, noise: float = 1.0, seed: int = 0) -> None:
+        self._make_renderer = partial(_Renderer, rig, world, cast, noise)
+        self._renderer: _Renderer | None = None
+        self.way = LateCamera(cast.rows.params, seed)
+        self._sequence = 0
+        self._due_us = 0
+
+    def add_sink(self, sink: Sink) -> None:
+        """Somebody who gets every picture from now on, when it comes."""
+        self._renderer = self._renderer or self._make_renderer()
+        self.way.add_sink(sink)
+
+    def frame(self, time_us: int) -> None:
+        """Takes a picture if one is due and somebody gets it, and hands on what has come."""
+        is_due = time_us >= self._due_us
+        if is_due:
+            self._due_us = max(self._due_us + PERIOD_US, time_us)
+            self._sequence += 1  # of those that nobody gets too: the later ones do not depend on who looks
+        if self._renderer is None:
+            return
+        if is_due:
+            pixels, half_m = self._renderer.take(), float(DEPTH_HALF_M)
+            self.way.publish(ImageFrame(time_us, self._sequence, pixels, HFOV_DEG, TILT_DEG, half_m))
+        self.way.frame(time_us)
+
+
+class _Renderer:
+    """Takes the camera's pictures; arguments as of `OnboardCamera`."""
+
+    def __init__(self, rig: Rig, world: WorldMap, cast: FlownCast, noise: float) -> None:
         rows = cast.rows
         size: dict[str, Any] = {"width": IMAGE_SIZE, "height": IMAGE_SIZE, "hfov_deg": HFOV_DEG}
         self._camera = QuickCamera(world, 1, **size, people=rows.drawn, clothes=rows.clothes, has_optics=True)
@@ -58,27 +88,12 @@ class OnboardCamera:
         inputs = [self._camera.rgb, self._camera.depth_m, everyone, images]
         self._pack = wp.launch(pack_images, (1, IMAGE_SIZE), inputs, record_cmd=True)
         self._kept = (params, everyone)  # recorded launches do not
-        self._images: NDArray[np.uint8] = images.numpy()
-        self.way = LateCamera(params, seed)
-        self._sequence = 0
-        self._due_us = 0
+        self._image: NDArray[np.uint8] = images.numpy()[0]  # live
 
-    def add_sink(self, sink: Sink) -> None:
-        """Somebody who gets every picture from now on, when it comes."""
-        self.way.add_sink(sink)
-
-    def frame(self, time_us: int) -> None:
-        """Takes a picture if one is due, and hands on what has come."""
-        if time_us >= self._due_us:
-            self._due_us = max(self._due_us + PERIOD_US, time_us)
-            self.way.publish(self.take(time_us))
-        self.way.frame(time_us)
-
-    def take(self, time_us: int) -> ImageFrame:
-        """A picture of this moment."""
+    def take(self) -> NDArray[np.uint8]:
+        """The pixels of this moment."""
         for launch in (self._aim, self._set_optics):
             launch.launch()
         self._camera.render()
         self._pack.launch()
-        self._sequence += 1
-        return ImageFrame(time_us, self._sequence, self._images[0].copy(), HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
+        return self._image.copy()

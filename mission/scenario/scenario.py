@@ -5,11 +5,11 @@ flown by `runner.run_scenario`. Light to import.
 """
 
 from pathlib import Path
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from common.config.refusal import meant_or_known
+from common.config.refusal import NO_SUCH_KEY, meant_or_known
 from mission.flight_settings import EngineName, Pace
 from mission.scenario.parts.checks import Check
 from mission.scenario.parts.faults import Fault
@@ -73,6 +73,16 @@ class Home(Part):
     alt_m: float = Field(default=488.0, ge=-500.0, le=6000.0)
 
 
+def _follow_me_number(name: str) -> str:
+    """The name, if FollowMe has such a task parameter."""
+    from policies.tasks.follow_me.follow_me_params import FOLLOW_PARAMS  # only who gives numbers waits for it
+
+    known = [number.name for number in FOLLOW_PARAMS]
+    if name not in known:
+        raise ValueError(f"{NO_SUCH_KEY}; {meant_or_known(name, known)}")
+    return name
+
+
 class Owner(Part):
     """A person who walks about with a phone, and is followed."""
 
@@ -80,7 +90,7 @@ class Owner(Part):
     """walk: up to 2 m/s; run: up to 5 m/s."""
     start_m: float = Field(default=3.0, ge=1.0, le=50.0)
     """How far north of home they wait."""
-    numbers: dict[str, Finite] = Field(default_factory=dict)
+    numbers: dict[Annotated[str, AfterValidator(_follow_me_number)], Finite] = Field(default_factory=dict)
     """Task parameters of FollowMe that hold for a flight: how the owner and others walk and look, phone, camera."""
 
 

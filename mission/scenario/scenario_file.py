@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from common.config.refusal import NO_SUCH_KEY, keys_beside, sentence
+from common.config.refusal import NO_SUCH_KEY, faulty_path, keys_beside, sentence
 from common.config.yaml_locations import ConfigError, Located, location_at, parse_yaml
 from mission.console.option_checks import UserError
 from mission.scenario.scenario import Scenario
@@ -104,8 +104,8 @@ def scenario_of(root: Located, name: str, folder: Path) -> Scenario:
 
 def _fault(error: ValidationError, root: Located) -> str:
     """The first fault as a sentence with its place."""
-    first = min(error.errors(), key=lambda each: location_at(root, each["loc"])[0].line)
-    location, key = location_at(root, first["loc"])
+    first = min(error.errors(), key=lambda each: location_at(root, faulty_path(each))[0].line)
+    location, key = location_at(root, faulty_path(first))
     text = sentence(first, Scenario)
     if text == NO_SUCH_KEY:
         text += f"; there are {', '.join(keys_beside(Scenario, first['loc']))}"

@@ -84,14 +84,15 @@ def keep_for_replay(
         path_ned: [m] (n, 3) of its plan.
         action: what a policy on board chose last.
     """
-    controller, owner = flight.controller, flight.owner
+    controller = flight.controller
+    owner = None if flight.owner is None else flight.owner.people.numpy()  # live
 
     def take(row: Any) -> None:
         chosen = action()
         row["goal_ned"] = controller.state.goal_ned
         row["action"] = nan if chosen is None else chosen
         if owner is not None:
-            row["owner"] = owner.people.numpy()[0]
+            row["owner"] = owner[0]
 
     path = np.array(path_ned, np.float32).reshape(-1, 3).tolist()
     info = {CONFIG_KEY: json.dumps(_kept_config(flight)), PATH_KEY: json.dumps(path)}

@@ -292,16 +292,24 @@ class StreamSchedule:
         heapify(self._queue)
         self._is_planned = True
 
-    def due(self, now_us: int, state: VehicleState) -> list[Payload]:
-        """What is due now; where messages come more often than frames, first what was due since the last one."""
+    def due(self, now_us: int, state: VehicleState, built: dict[int, bytes | None]) -> list[Payload]:
+        """What is due now; where messages come more often than frames, first what was due since the last one.
+
+        Args:
+            now_us: simulated time.
+            state: of the vehicle now.
+            built: what other links were sent of it now, by message id; added to.
+        """
         messages: list[Payload] = []
         if self.needs_ticks:
             for moment in state.ticks:
-                self._add_due(moment.time_us, moment, messages)
-        self._add_due(now_us, state, messages)
+                self._add_due(moment.time_us, moment, {}, messages)
+        self._add_due(now_us, state, built, messages)
         return messages
 
-    def _add_due(self, now_us: int, state: VehicleState, messages: list[Payload]) -> None:
+    def _add_due(
+        self, now_us: int, state: VehicleState, built: dict[int, bytes | None], messages: list[Payload]
+    ) -> None:
         if not self._is_planned:
             self._plan(now_us)
         queue = self._queue
@@ -310,6 +318,8 @@ class StreamSchedule:
             due_us, msg_id = queue[0]
             next_us = due_us + interval_us[msg_id]
             heapreplace(queue, (next_us if next_us > now_us else now_us + interval_us[msg_id], msg_id))
-            payload = builders[msg_id](state)
+            if msg_id not in built:
+                built[msg_id] = builders[msg_id](state)
+            payload = built[msg_id]
             if payload is not None:
                 messages.append((types[msg_id], payload))

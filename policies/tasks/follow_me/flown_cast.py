@@ -113,8 +113,6 @@ class FlownCast:
     def __init__(
         self, world: WorldMap, truths: Any, people: Any, model: Any, numbers: Mapping[str, float], seed: int
     ) -> None:
-        self._truths = truths
-        self._world, self._model, self._seed = world, model, seed
         self.rows: Any = CastRows()
         self.rows.params = params_row(numbers)
         self.rows.people = people
@@ -122,11 +120,15 @@ class FlownCast:
         self.rows.drawn = wp.zeros((1, PEOPLE_MAX), dtype=Person)
         self.rows.clothes = wp.zeros((1, PEOPLE_MAX), dtype=Clothes)
         wp.launch(_begin, 1, [world.kernel, model, usual_clothes(), seed, self.rows])
+        inputs = [world.kernel, model, truths, seed, 0, -1.0, self.rows]
+        self._step = wp.launch(_step, 1, inputs, record_cmd=True)
+        self._kept = (world, truths)  # recorded launches do not
 
     def step(self, tick: int, since_s: float) -> None:
         """Moves on to a tick, PERSON_TICKS after the last; `since_s` after the owner has set off, below 0: not yet."""
-        seed, rows = self._seed, self.rows
-        wp.launch(_step, 1, [self._world.kernel, self._model, self._truths, seed, tick, since_s, rows])
+        self._step.set_param_at_index_from_ctype(4, tick)
+        self._step.set_param_at_index_from_ctype(5, since_s)
+        self._step.launch()
 
 
 def params_row(numbers: Mapping[str, float]) -> Any:

@@ -61,6 +61,7 @@ def test_a_scenario_may_be_a_file_beside_it(tmp_path):
         ("{uniform: [0, 8]}", "{loguniform: [0, 8]}", "loguniform: bounds must be above 0, not 0"),
         ("{uniform: [0, 8]}", "{uniform: [0, 80]}", "so: wind.speed_m_s: must be at most 20, not 80"),
         ("wind.speed_m_s: {uni", "wind.sped: {uni", "so: wind.sped: unknown key; did you mean speed_m_s?"),
+        ("wind.speed_m_s: {uni", "owner.numbers.lite: {uni", "owner.numbers.lite: unknown key; did you mean light?"),
         ("wind.speed_m_s: {uni", "faults.1.at: {uni", "vary.faults.1.at: faults has no entry 1; there are 0 to 0"),
         ("wind.speed_m_s: {uni", "seed: {uni", "vary.seed: must be integers from 0 to"),
         ("takeoff: 5", "takeof: 5", "hop.campaign.yaml:6: vehicle.script[1]"),

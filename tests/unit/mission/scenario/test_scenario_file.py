@@ -82,6 +82,16 @@ def test_python_makes_the_same_scenario(tmp_path):
         ),
         ("about:", "xyz:", "1: xyz: unknown key; there are name, about, seeds,"),
         ("about:", "world: {kind: lunar}\nabout:", "1: world.kind: must be hills, plain, airfield, follow, forest,"),
+        (
+            "about:",
+            "owner:\n  numbers:\n    light: 0.5\n    bystandrs: 3\nabout:",
+            "4: owner.numbers.bystandrs: unknown key; did you mean bystanders?",
+        ),
+        (
+            "about:",
+            "owner: {numbers: {xyz: 3}}\nabout:",
+            "1: owner.numbers.xyz: unknown key; there are hill_height_m, trees_per_ha, owner_speed_max,",
+        ),
         ("about:", "aboot:", "1: aboot: unknown key; did you mean about?"),
         ("about: Up and down.", "about: [", "not YAML"),
         ("vehicle:\n", "vehicle:\n  plan: a.plan\n", "2: vehicle: plan and script: choose one"),

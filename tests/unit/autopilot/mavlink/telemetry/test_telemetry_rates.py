@@ -6,7 +6,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.interface.outputs import Output, OutputKind
 from autopilot.interface.vehicle_state import LandedState, Mode
-from autopilot.mavlink.telemetry.telemetry_rates import STREAMS
+from autopilot.mavlink.telemetry.telemetry_rates import STREAMS, StreamSchedule
 from autopilot.mavlink.transport.links import LinkRole
 from autopilot.mavlink.wire.codec import message_id
 from autopilot.ports import POSITION_VALID, WIND_VALID, Actuators
@@ -45,6 +45,20 @@ def test_messages_are_spread_over_the_frames():
     rig.frame(100)
     counts = [len(rig.frame()) for _ in range(500)]
     assert max(counts) <= 8
+
+
+def test_what_is_due_on_several_links_is_packed_once():
+    rig = Rig()
+    rig.frame(3)
+    endpoint, built = rig.server._endpoint, {}
+    one, other = (StreamSchedule(endpoint.telemetry, LinkRole.GROUND) for _ in range(2))
+    first = one.due(rig.time_us, endpoint.vehicle.state, built)
+    assert len(first) > 3
+    for (kind, payload), (same_kind, same) in zip(
+        first, other.due(rig.time_us, endpoint.vehicle.state, built), strict=True
+    ):
+        assert kind is same_kind
+        assert payload is same
 
 
 @pytest.mark.parametrize("stream", STREAMS, ids=lambda stream: stream.name)
