@@ -92,7 +92,9 @@ class MonoDepth:
         """
         down_rdf = rotated(inverse(camera_mount()), down_frd)
         with torch.inference_mode():
-            ground = flat_ground(torch.tensor([down_rdf]), torch.tensor([height_m]))
+            ground = flat_ground(
+                torch.tensor([down_rdf], dtype=torch.float32), torch.tensor([height_m], dtype=torch.float32)
+            )
             logits = self._network(torch.tensor(pixels[None, ..., :3]), ground)[0].numpy()
         is_person = logits[BINS] > np.log(_SOMEBODY / (1.0 - _SOMEBODY))
         return SeenDepth(_full(quantile_byte(logits[:BINS])), _full(is_person))

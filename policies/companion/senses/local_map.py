@@ -52,6 +52,8 @@ class LocalMap:
         self._corner = (0, 0)  # cell indices of the grid's first cell
         self.has_depth = False
         """The last picture had depth, the last scan a return."""
+        self.is_known = False
+        """The last picture told depth, by a depth camera or by its colours."""
         self._rays_frd = _rays()
         near = np.arange(-_OWN_M, _OWN_M + CELL_M, CELL_M)
         self._own = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _OWN_M])
@@ -68,13 +70,14 @@ class LocalMap:
             now_us: the vehicle's clock.
         """
         self._follow(pose.pos_ned)
-        self.has_depth = bool((depth < _NONE).mean() > _ALIVE)
+        self.is_known = self.has_depth = has_depth(depth)
         if self.has_depth:
             self._take(depth, np.zeros(depth.shape, bool), pose, owner, now_us)
 
     def guess(self, seen: SeenDepth, pose: Pose, owner: tuple[Floats, Floats] | None, now_us: int) -> None:
         """Takes in what a picture's colours say, where there is no depth; people are no part of the map."""
         self._follow(pose.pos_ned)
+        self.is_known, self.has_depth = True, False
         self._take(seen.depth, seen.is_person, pose, owner, now_us)
 
     def _take(
@@ -247,6 +250,11 @@ class LocalMap:
             for grid in (self._free_us, self._solid_us, self._over_us):
                 np.moveaxis(grid, axis, 0)[lines] = _UNSEEN
         self._corner = (corner[0], corner[1])
+
+
+def has_depth(depth: NDArray[np.uint8]) -> bool:
+    """Whether a depth channel has returns enough: the camera works."""
+    return bool((depth < _NONE).mean() > _ALIVE)
 
 
 def _rays() -> Floats:

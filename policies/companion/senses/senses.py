@@ -5,6 +5,7 @@ phone together, since when the owner has not been seen, and a level map of what 
 detector sees where they are expected; after a while without them, only who is there in several images in a row.
 """
 
+from dataclasses import replace
 from math import atan2, inf, isfinite
 
 import numpy as np
@@ -14,7 +15,7 @@ from common.attitude import Vector, inverse, quat_of, rotated, yaw_of
 from common.image_stream import ImageFrame
 from policies.companion.observation import REPORT_LAG_S
 from policies.companion.owner_watch import OwnerWatch, sighting_from
-from policies.companion.senses.local_map import LocalMap
+from policies.companion.senses.local_map import LocalMap, has_depth
 from policies.companion.senses.other_people import OtherPeople
 from policies.companion.senses.phone_check import PhoneCheck, PhoneFit, Word
 from policies.companion.senses.poses import Pose, PoseHistory
@@ -94,7 +95,13 @@ class Senses:
             return
         self.image_us = image.time_us
         down = rotated(inverse(pose.q_ned_from_frd), (0.0, 0.0, 1.0))
-        found = self._detector.find(image.pixels, (down[0], down[1]))
+        pixels, told = image.pixels, None
+        if not has_depth(pixels[..., 3]):
+            told = self._mono_depth.see(pixels, down, own.range_m * down[2])
+            pixels = np.concatenate([pixels[..., :3], told.depth[..., None]], -1)
+        found = self._detector.find(pixels, (down[0], down[1]))
+        if told is not None:
+            found = [replace(detection, has_depth=False) for detection in found]
         found = [detection for detection in found if detection.probability >= _SURE]
         seen = self._owner_among(found, pose)
         sighting = None if seen is None else sighting_from(seen.chest_hfrd, pose.pos_ned, pose.q_ned_from_frd)
@@ -105,9 +112,9 @@ class Senses:
             self.bearing_rad = atan2(place[1] - pose.pos_ned[1], place[0] - pose.pos_ned[0])
             self.seen.see(place, pose, has_depth=seen.has_depth)
         owner_then = self._owner_then(image.time_us, own)
-        self.map.see(image.pixels[..., 3], pose, owner_then, own.boot_us)
-        if not self.map.has_depth:
-            told = self._mono_depth.see(image.pixels, down, own.range_m * down[2])
+        if told is None:
+            self.map.see(image.pixels[..., 3], pose, owner_then, own.boot_us)
+        else:
             self.map.guess(told, pose, owner_then, own.boot_us)
             if seen is not None:
                 self.map.sight(pose, place, own.boot_us)
