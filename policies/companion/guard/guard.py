@@ -26,8 +26,9 @@ from policies.tasks.follow_me.tracked.owner_filter import std_along
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
 _YAW_MAX = 1.5  # [rad/s]
-_SEARCH_PERIOD_S = 15.0  # of a search towards the phone: at first it looks there,
-_SEARCH_FACES_S = 4.0  # and then round it
+_SEARCH_PERIOD_S = 24.0  # of a search towards the phone: at first it looks there,
+_SEARCH_FACES_S = 4.0  # then there from other sides, since trees may hide who is there,
+_SEARCH_ROUNDS_S = 13.0  # and then round itself
 _THERE_M = 2.0  # so near the stand-off it looks round
 _RISEN_US = 2_000_000  # for so long it stays over the owner
 _SILENCE_MAX_S = 60.0  # silence that is no number is so long
@@ -112,9 +113,9 @@ class Guard:
         return Stance.SLOW if silence_s > s.slow_s or age_s > s.image_slow_s else Stance.FREE
 
     def _searched(self, own: Own, is_searching: bool) -> tuple[Floats, float, float]:
-        """Up, out of people's way; towards the phone, no nearer than a stand-off; without one it turns on the spot.
+        """Up, out of people's way; towards the phone, no nearer than a stand-off, and round it; without one it turns.
 
-        With one too now and then: the phone may be wrong.
+        With one it turns on the spot too now and then: the phone may be wrong.
         """
         s = self.settings
         down = -CLIMB_M_S * float(np.clip(2.0 * (s.search_height_m - own.range_m), -0.5, 1.0))
@@ -126,11 +127,14 @@ class Guard:
             yaw_rate = self._facing(atan2(way[1], way[0]), own)
             if not is_searching or far_m < 0.1:
                 return np.zeros(2), down, yaw_rate
-            is_there = far_m < s.search_stand_off_m + _THERE_M
-            if is_there and (self._alone_s(own) - s.search_s) % _SEARCH_PERIOD_S > _SEARCH_FACES_S:
-                yaw_rate = s.search_yaw_rate
             speed = min(stopping_speed(far_m - s.search_stand_off_m, s.reaction_s, 1.0), s.search_speed)
-            return speed * way / far_m, down, yaw_rate
+            level = speed * way / far_m
+            phase_s = (self._alone_s(own) - s.search_s) % _SEARCH_PERIOD_S
+            if far_m > s.search_stand_off_m + _THERE_M or phase_s < _SEARCH_FACES_S:
+                return level, down, yaw_rate
+            if phase_s < _SEARCH_ROUNDS_S:
+                return level + s.search_round_speed * np.array([-way[1], way[0]]) / far_m, down, yaw_rate
+            return level, down, s.search_yaw_rate
         if is_searching:
             return np.zeros(2), down, s.search_yaw_rate
         return np.zeros(2), down, self._facing(self.senses.bearing_rad, own)

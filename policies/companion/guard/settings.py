@@ -30,6 +30,8 @@ class GuardSettings(BaseModel):
     """[m/s] towards the phone."""
     search_stand_off_m: float = Field(default=5.0, gt=0.0)
     """It comes no nearer to where the phone says."""
+    search_round_speed: float = Field(default=1.5, ge=0.0)
+    """[m/s] round it, where nobody is seen there."""
     search_height_m: float = Field(default=2.6, gt=0.0)
     """Above the ground, where it waits and searches: over people, under crowns."""
     search_yaw_rate: float = Field(default=0.6, gt=0.0)

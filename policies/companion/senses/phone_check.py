@@ -27,7 +27,8 @@ _NOBODY = 3.5  # cost of a report if its owner is none of those who are seen; th
 _SURE = 3.0  # log likelihood ratio that counts,
 _SURE_ALONE = 9.0  # and where nobody else was seen
 _FITS = 3.0  # from which an unknown one is the owner
-_MOST = 10.0  # either way: somebody may be taken for another at any time
+_MOST = 10.0  # either way: somebody may be taken for another at any time;
+_LEAST = 4.0  # and against somebody else: they may turn out to be the owner soon
 _HEARD = 2  # after so many reports
 _KNOWN = 8  # after so many the phone's noise is
 _STEADY = 0.1  # of each report: how soon a worse phone is noticed
@@ -165,9 +166,11 @@ class PhoneCheck:
         for who, fit in everyone:
             fit.hear(phone, phone_vel, who, since_s, self._usual)
         over = max((fit.odds - _MOST for _, fit in everyone), default=0.0)
-        least = -_MOST if self._usual.noise.steps >= _KNOWN else 0.0  # nobody is doubted before
-        for _, fit in everyone:
-            fit.odds = max(fit.odds - max(over, 0.0), least)
+        for _, fit in others:
+            fit.odds = max(fit.odds - max(over, 0.0), -_LEAST)
+        if owner is not None:
+            least = -_MOST if self._usual.noise.steps >= _KNOWN else 0.0  # not doubted before
+            owner[1].odds = max(owner[1].odds - max(over, 0.0), least)
         odds = [self._usual.odds(fit) for _, fit in others]
         best = max(range(len(others)), key=odds.__getitem__, default=-1)
         is_heard = best >= 0 and others[best][1].reports >= _HEARD
