@@ -30,7 +30,7 @@ PLACES = {
     "learn": (
         *("policies/companion", "policies/datasets", "policies/experts", "policies/learn", "policies/offline"),
         "policies/tracker.py",
-        *("policies/person_detector", "mission/benchmark/any_pilot.py"),
+        *("policies/mono_depth", "policies/person_detector", "mission/benchmark/any_pilot.py"),
         *("mission/train", "mission/video/rtp_video.py", "mission/video/video_file.py"),
     ),
     "lerobot": ("policies/datasets/exporting.py",),
