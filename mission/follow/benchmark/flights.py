@@ -43,6 +43,7 @@ class Outcome:
     nearest_hidden_m: float  # while they were hidden; NaN: they never were
     has_stood: bool | None  # five seconds after the last sight; None: never out of sight for so long
     has_resumed: bool | None  # ten seconds after the owner was back; None: never
+    is_kept: bool  # the owner: to the end, and never out of the band for over ten seconds while they could be seen
     interventions_per_min: float
     accel_rms: float  # [m/s²] of the vehicle, level, samples 0.1 s apart
     yaw_rate_rms: float  # [deg/s]
@@ -87,6 +88,7 @@ def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, sec
         nearest_hidden_m=float(distance[hidden].min()) if hidden.any() else nan,
         has_stood=_has_stood(hidden, speed, track.interval_s),
         has_resumed=_has_resumed(hidden, is_in_band, track.interval_s),
+        is_kept=not is_collided and not companion.trouble and _is_kept(hidden, is_in_band, track.interval_s),
         interventions_per_min=changed_per_min(companion.skill.interventions, len(hidden) * track.interval_s),
         accel_rms=smoothness.accel_rms,
         yaw_rate_rms=smoothness.yaw_rate_rms,
@@ -111,3 +113,8 @@ def _has_resumed(hidden: Array, is_in_band: Array, interval_s: float) -> bool | 
     if not ends:
         return None
     return all(any(is_in_band[k : k + length].all() for k in range(end, end + due - length + 1)) for end in ends)
+
+
+def _is_kept(hidden: Array, is_in_band: Array, interval_s: float) -> bool:
+    """Whether it was never out of the band for longer than it may take to be back."""
+    return all(end - first <= round(BACK_S / interval_s) for first, end in spans(~is_in_band & ~hidden))

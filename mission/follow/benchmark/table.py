@@ -11,8 +11,8 @@ from mission.follow.benchmark.flights import Outcome
 from policies.tasks.follow_me.scorecard import written
 
 COLUMNS = (
-    "condition", "flights", "in band", "no collision", "nearest", "stood", "resumed", "changed / min", "accel",
-    "yaw rate",
+    "condition", "flights", "in band", "no collision", "kept", "nearest", "stood", "resumed", "changed / min",
+    "accel", "yaw rate",
 )  # fmt: skip
 
 
@@ -26,6 +26,7 @@ def row(condition: Condition, outcomes: Sequence[Outcome]) -> tuple[str, ...]:
         str(len(outcomes)),
         written(bootstrap(len(band), lambda rows: float(band[rows].mean())), "%"),
         written(rate(np.array([not outcome.is_collided for outcome in outcomes])), "%"),
+        written(_fraction([outcome.is_kept for outcome in outcomes]), "%"),
         f"{nearest_m:.2f} m",
         written(_fraction([outcome.has_stood for outcome in outcomes]), "%"),
         written(_fraction([outcome.has_resumed for outcome in outcomes]), "%"),

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from mission.benchmark.session import misses
 from mission.cli import app
 from mission.follow.benchmark.conditions import BY_NAME, CONDITIONS
-from mission.follow.benchmark.flights import Outcome, _has_resumed, _has_stood, fly
+from mission.follow.benchmark.flights import Outcome, _has_resumed, _has_stood, _is_kept, fly
 from mission.follow.benchmark.pilots import any_pilot
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.pilot import PilotError
@@ -93,9 +93,16 @@ def test_standing_and_following_again_are_counted_from_what_was_seen():
     assert not _has_resumed(hidden, np.arange(300) > 250, 0.1)
 
 
+def test_an_owner_is_kept_who_was_not_lost_for_long():
+    seen, away = np.zeros(300, dtype=bool), np.arange(300)
+    assert _is_kept(seen, (away < 50) | (away > 140), 0.1)
+    assert not _is_kept(seen, (away < 50) | (away > 180), 0.1)
+    assert _is_kept((away > 90) & (away < 140), (away < 50) | (away > 180), 0.1)
+
+
 def test_what_fell_short_is_named():
-    good = Outcome(1, 0.99, False, False, 1.5, float("nan"), None, None, 0.0, 1.0, 10.0, 60.0, "")
-    bad = Outcome(3, 0.5, True, True, 0.4, float("nan"), None, None, 0.0, 1.0, 10.0, 20.0, "")
+    good = Outcome(1, 0.99, False, False, 1.5, float("nan"), None, None, True, 0.0, 1.0, 10.0, 60.0, "")
+    bad = Outcome(3, 0.5, True, True, 0.4, float("nan"), None, None, False, 0.0, 1.0, 10.0, 20.0, "")
     assert misses("follow", {"walk": [good]}) == []
     assert len(misses("follow", {"walk": [good, bad]})) == 2
 
