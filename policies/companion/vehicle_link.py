@@ -93,6 +93,7 @@ class Owner:
 
     pos_ned: Vector = (nan, nan, nan)  # [m] in the vehicle's local frame
     vel_ned: Vector = (0.0, 0.0, 0.0)  # [m/s]
+    has_velocity: bool = False  # it says so itself
     std_m: float = nan  # of a horizontal axis, as the phone says; NaN: it does not
     arrived_us: int = NEVER_US
     count: int = 0  # reports so far
@@ -296,12 +297,12 @@ class VehicleLink:
         if origin is None or not fields.est_capabilities & _HAS_POSITION:
             return
         pos_ned = ned_from_geodetic(degrees_from_e7(fields.lat), degrees_from_e7(fields.lon), fields.alt, origin)
-        has_velocity = fields.est_capabilities & _HAS_VELOCITY and not any(map(isnan, fields.vel))
+        has_velocity = bool(fields.est_capabilities & _HAS_VELOCITY) and not any(map(isnan, fields.vel))
         north, east, down = fields.vel if has_velocity else (0.0, 0.0, 0.0)
         if not is_known(POSITION_MAX_M, *pos_ned) or not is_known(SPEED_MAX_M_S, north, east, down):
             return
         owner, var = self.owner, fields.position_cov[0]
-        owner.pos_ned, owner.vel_ned = pos_ned, (north, east, down)
+        owner.pos_ned, owner.vel_ned, owner.has_velocity = pos_ned, (north, east, down), has_velocity
         owner.std_m = var**0.5 if 0.0 < var <= POSITION_MAX_M else nan
         owner.arrived_us = time_us
         owner.count += 1

@@ -65,6 +65,7 @@ class Guard:
         self._is_too_near = False
         self._sinking_max = 0.0  # [m/s] of who is too near
         self._risen_us = NEVER_US  # when it rose over the owner last
+        self._there_us = 0  # when a search came to where the phone says
 
     def begin(self, own: Own) -> None:
         """The policy takes over."""
@@ -126,11 +127,14 @@ class Guard:
             far_m = float(np.hypot(*way))
             yaw_rate = self._facing(atan2(way[1], way[0]), own)
             if not is_searching or far_m < 0.1:
+                self._there_us = own.boot_us
                 return np.zeros(2), down, yaw_rate
             speed = min(stopping_speed(far_m - s.search_stand_off_m, s.reaction_s, 1.0), s.search_speed)
             level = speed * way / far_m
-            phase_s = (self._alone_s(own) - s.search_s) % _SEARCH_PERIOD_S
-            if far_m > s.search_stand_off_m + _THERE_M or phase_s < _SEARCH_FACES_S:
+            if far_m > s.search_stand_off_m + _THERE_M:
+                self._there_us = own.boot_us
+            phase_s = max(own.boot_us - self._there_us, 0) * 1e-6 % _SEARCH_PERIOD_S
+            if phase_s < _SEARCH_FACES_S:
                 return level, down, yaw_rate
             if phase_s < _SEARCH_ROUNDS_S:
                 return level + s.search_round_speed * np.array([-way[1], way[0]]) / far_m, down, yaw_rate

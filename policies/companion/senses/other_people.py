@@ -47,7 +47,9 @@ class OtherPeople:
         self.met_us: int | None = None
         """When one of them was seen last who walked: a trunk that the detector takes for somebody does not."""
 
-    def left(self, places: list[Floats], owner: Floats | None, pose: Pose, gone_us: int | None = None) -> list[int]:
+    def left(
+        self, places: list[Floats], owner: Floats | None, pose: Pose, gone_us: int | None = None, *, has_depth: bool
+    ) -> list[int]:
         """Indices of the places that are nobody's whom it knows, the owner's among them; the others are taken in.
 
         Args:
@@ -55,6 +57,7 @@ class OtherPeople:
             owner: [m] where the owner is expected; None: nobody knows.
             pose: when and from where they were seen.
             gone_us: when the owner was seen last, if they are gone: who was met since may be the owner.
+            has_depth: their ranges are measured.
         """
         if gone_us is not None:
             self._known = [one for one in self._known if one.met_us < gone_us - _TOGETHER_US]
@@ -74,7 +77,7 @@ class OtherPeople:
         for k, who in taken.items():
             if who != _OWNER:
                 one = self._known[who]
-                one.person.see(places[k], pose, has_depth=True)
+                one.person.see(places[k], pose, has_depth=has_depth)
                 if float(np.hypot(*(places[k] - one.first_ned)[:2])) > _WALKS_M:
                     self.met_us = pose.time_us
         return [k for k in range(len(places)) if taken.get(k, _OWNER) == _OWNER]
@@ -108,13 +111,13 @@ class OtherPeople:
     def _lately(self, time_us: int) -> list[_Known]:
         return [one for one in self._known if time_us - one.person.time_us < _LATELY_US]
 
-    def meet(self, places: list[Floats], owner: Floats | None, pose: Pose) -> None:
+    def meet(self, places: list[Floats], owner: Floats | None, pose: Pose, *, has_depth: bool) -> None:
         """Somebody new is at each of these places, but for what may be a part of the owner or of who is known."""
         known = [one.person.now(pose.time_us)[0] for one in self._known]
-        for place in places[: _MAX - len(self._known)]:
+        for place in places[: max(_MAX - len(self._known), 0)]:
             beside = [*known, *([owner] if owner is not None else [])]
             if any(float(np.hypot(*(place - other)[:2])) < _APART_M for other in beside):
                 continue
             one = _Known(SeenOwner(), pose.time_us, place, PhoneFit())
-            one.person.see(place, pose, has_depth=True)
+            one.person.see(place, pose, has_depth=has_depth)
             self._known.append(one)

@@ -1,8 +1,9 @@
 """Whether the phone is with whom is taken for the owner: its reports against everybody who is seen.
 
-In: each report, and where everybody is and goes. Out: who else it would rather be, or that it is none of them. Whoever
-has the phone goes as it says, and is off from where it says by an error that changes slowly: how well that fits is
-summed up for each person (a likelihood of its innovations, old reports forgotten), and compared.
+In: each report, and where everybody is and goes. Out: who else it would rather be, or that it is none of them. Who
+has the phone goes as it says, and is off from where it says by an error that changes slowly. How much likelier each
+report is of a person than of somebody unseen is summed up for each (a logarithm of likelihood ratios), up to a bound,
+so that old reports are outweighed in seconds, and compared.
 """
 
 from collections.abc import Sequence
@@ -18,12 +19,14 @@ from policies.companion.senses.seen_owner import PersonNow
 Floats = NDArray[np.float64]
 OFF_STD_M = 1.7  # of the phone's slow error in the vehicle's frame, as the tracker takes it
 _DRIFT_M2_S = 2.0 * OFF_STD_M**2 / 60.0  # what its variance grows by
-_PLACE_VAR = 0.3**2 + 0.3**2  # [m²] white, of the phone and of sights
+_PLACE_VAR = 0.3**2 + 0.2**2  # [m²] white, of the phone, and of bodies beside their middles
 _VEL_VAR = 0.2**2 + 0.2**2  # [m²/s²] of the phone, and of what somebody changes while a report is under way
 _PRIOR_VAR = 1.0  # [m²] how much another's error may differ from what has been learned
 _CHANGED_VAR, _CHANGED_MAX = 1.5, 4.0  # [m²] of a change of that error, and the most that speaks against one
-_COST_MAX = 8.0  # of one report: somebody who turns round does not go as it says
-_NOBODY = 3.5  # cost of a report if its owner is none of those who are seen; theirs is one and a half
+_WHOLE_S = 0.5  # a report that comes sooner after the last counts as much less: their errors are alike
+_LOSS_MAX = 4.5  # of one report: somebody who turns round does not go as it says
+_ANY_VEL_VAR = 1.0  # [m²/s²] each axis: how somebody who is not seen may go beside who is
+_PLACE, _PLACE_ALONE = 1.5, 3.5  # likelihood that a place which fits gains, with a velocity and without
 _SURE = 3.0  # log likelihood ratio that counts,
 _SURE_ALONE = 9.0  # and where nobody else was seen
 _FITS = 3.0  # from which an unknown one is the owner
@@ -31,6 +34,7 @@ _MOST = 10.0  # either way: somebody may be taken for another at any time;
 _LEAST = 4.0  # and against somebody else: they may turn out to be the owner soon
 _HEARD = 2  # after so many reports
 _KNOWN = 8  # after so many the phone's noise is
+_NEXT_S = 1.6  # a report that comes later than this is not the next
 _STEADY = 0.1  # of each report: how soon a worse phone is noticed
 
 
@@ -100,13 +104,18 @@ class PhoneFit:
         if self.off is None:
             self.off, self.var = usual.prior(self.apart)
         self.var += _DRIFT_M2_S * noise.place * since_s
-        place_var = self.var + noise.place * _PLACE_VAR
+        usual_var = noise.place * _PLACE_VAR + 0.5 * float(np.trace(who.pos_var))
+        place_var = self.var + usual_var
         astray = self.apart - self.off
-        cost = 0.5 * float(astray @ astray) / place_var + log(place_var / (noise.place * _PLACE_VAR))
-        if self.apart_vel is not None:
+        gained = -0.5 * float(astray @ astray) / place_var - log(place_var / usual_var)
+        if self.apart_vel is None:
+            gained += _PLACE_ALONE
+        else:
             vel_var = noise.vel * _VEL_VAR + 0.5 * float(np.trace(who.vel_var))
-            cost += 0.5 * float(self.apart_vel @ self.apart_vel) / vel_var + log(vel_var / (noise.vel * _VEL_VAR))
-        self.odds += _NOBODY - min(cost, _COST_MAX)
+            any_var = vel_var + _ANY_VEL_VAR
+            apart2 = float(self.apart_vel @ self.apart_vel)
+            gained += _PLACE + log(any_var / vel_var) - 0.5 * apart2 * (1.0 / vel_var - 1.0 / any_var)
+        self.odds += min(since_s / _WHOLE_S, 1.0) * max(gained, -_LOSS_MAX)
         self.reports += 1
         gain = self.var / place_var
         self.off = self.off + gain * astray
@@ -165,12 +174,11 @@ class PhoneCheck:
         last = None if owner is None else (owner[1].apart, owner[1].apart_vel)
         for who, fit in everyone:
             fit.hear(phone, phone_vel, who, since_s, self._usual)
-        over = max((fit.odds - _MOST for _, fit in everyone), default=0.0)
         for _, fit in others:
-            fit.odds = max(fit.odds - max(over, 0.0), -_LEAST)
+            fit.odds = min(max(fit.odds, -_LEAST), _MOST)
         if owner is not None:
             least = -_MOST if self._usual.noise.steps >= _KNOWN else 0.0  # not doubted before
-            owner[1].odds = max(owner[1].odds - max(over, 0.0), least)
+            owner[1].odds = min(max(owner[1].odds, least), _MOST)
         odds = [self._usual.odds(fit) for _, fit in others]
         best = max(range(len(others)), key=odds.__getitem__, default=-1)
         is_heard = best >= 0 and others[best][1].reports >= _HEARD
@@ -178,15 +186,15 @@ class PhoneCheck:
             fits = has_met_others and is_heard and odds[best] > _FITS
             return (Word.ANOTHER, best) if fits else (Word.AGREES, -1)
         mine = self._usual.odds(owner[1])
-        self._learn(owner[1], *last)
+        self._learn(owner[1], *last, is_next=since_s < _NEXT_S)
         if is_heard and odds[best] - max(mine, 0.0) > _SURE:
             return Word.ANOTHER, best
         is_nobody = mine < -(_SURE if has_met_others else _SURE_ALONE)
         return (Word.NOBODY if is_nobody else Word.AGREES), -1
 
-    def _learn(self, fit: PhoneFit, last: Floats | None, last_vel: Floats | None) -> None:
-        """The phone's noise, and its slow error if it fits."""
-        if last is not None and fit.apart is not None:
+    def _learn(self, fit: PhoneFit, last: Floats | None, last_vel: Floats | None, *, is_next: bool) -> None:
+        """The phone's noise, of one report and the next, and its slow error if it fits."""
+        if is_next and last is not None and fit.apart is not None:
             has_vel = last_vel is not None and fit.apart_vel is not None
             step_vel = fit.apart_vel - last_vel if has_vel else None  # type: ignore[operator]
             self._usual.noise.learn(fit.apart - last, step_vel)

@@ -20,6 +20,8 @@ class PersonNow:
 
     pos_ned: Floats
     """[m] of the chest, (3,)."""
+    pos_var: Floats
+    """[m²] its covariance, level."""
     vel: Floats
     """[m/s] north and east."""
     vel_var: Floats
@@ -73,5 +75,5 @@ class SeenOwner:
     def person_now(self, time_us: int) -> PersonNow:
         """What is known of them at a time."""
         place, velocity = self.now(time_us)
-        var = np.asarray(self._row["both"]["vel_var"][0], np.float64)
-        return PersonNow(place, velocity, var, max(time_us - self.time_us, 0) * 1e-6)
+        pos_var, vel_var = (np.asarray(self._row["both"][name][0], np.float64) for name in ("pos_var", "vel_var"))
+        return PersonNow(place, pos_var, velocity, vel_var, max(time_us - self.time_us, 0) * 1e-6)

@@ -2,7 +2,8 @@
 
 In: images, telemetry, the phone's reports. Out: the owner's place and velocity by sights alone, the track of sights and
 phone together, since when the owner has not been seen, and a level map of what is solid. The owner is whom the
-detector sees where they are expected; after a while without them, only who is there in several images in a row.
+detector sees where they are expected; after a while without them, only who is there in several images in a row, and
+where others were met lately only whom the phone says.
 """
 
 from dataclasses import replace
@@ -107,6 +108,8 @@ class Senses:
         sighting = None if seen is None else sighting_from(seen.chest_hfrd, pose.pos_ned, pose.q_ned_from_frd)
         self.watch.take(image.time_us, own.boot_us, owner, sighting)
         if seen is not None:
+            if self.silence_s(own) > _GONE_S:  # found again, or for the first time: who it is the phone has yet to say
+                self._fit = PhoneFit()
             self.seen_us = image.time_us
             place = ned_of(seen.chest_hfrd, pose)
             self.bearing_rad = atan2(place[1] - pose.pos_ned[1], place[0] - pose.pos_ned[0])
@@ -129,7 +132,7 @@ class Senses:
         is_seen = self.silence_s(own) <= _GONE_S
         word, index = self._phone.hear(
             phone,
-            phone_vel if phone_vel.any() else None,
+            phone_vel if owner.has_velocity else None,
             min(since_s, PHONE_OLD_S),
             (self.seen.person_now(own.boot_us), self._fit) if is_seen else None,
             self._others.heard(own.boot_us),
@@ -160,7 +163,7 @@ class Senses:
     @property
     def is_heard(self) -> bool:
         """The phone has spoken not long ago."""
-        return self.heard_us is not None and self._boot_us - self.heard_us < PHONE_OLD_S * 1e6
+        return self._hears and self.heard_us is not None and self._boot_us - self.heard_us < PHONE_OLD_S * 1e6
 
     def owner_now(self, own: Own) -> PersonNow | None:
         """Where the owner is: by sights, or if those are old by the phone too; None: nobody knows."""
@@ -171,7 +174,7 @@ class Senses:
         if track is None or not track.is_known:
             return None
         place = track.pos_ned + max(own.boot_us - track.time_us, 0) * 1e-6 * track.vel_ned
-        return PersonNow(place, track.vel_ned[:2], track.vel_cov[:2, :2], silence_s)
+        return PersonNow(place, track.pos_cov[:2, :2], track.vel_ned[:2], track.vel_cov[:2, :2], silence_s)
 
     def others_now(self, own: Own) -> list[PersonNow]:
         """Where people are who were seen and not taken for the owner: one of them may be."""
@@ -192,20 +195,23 @@ class Senses:
         is_gone = silence_s > _GONE_S
         expected, gate_m = self._expected(pose.time_us, silence_s)
         places = [ned_of(detection.chest_hfrd, pose) for detection in found]
+        has_depth = all(detection.has_depth for detection in found)
         if is_gone and self.is_heard and self._has_met_others(pose.time_us):  # the phone says who of them it is
-            new = [places[k] for k in self._others.left(places, None, pose)]
-            self._others.meet(new, None, pose)
+            new = [places[k] for k in self._others.left(places, None, pose, has_depth=has_depth)]
+            self._others.meet(new, None, pose, has_depth=has_depth)
+            self._row = []
             return None
         if silence_s > _STRANGE_S:  # or nobody was the owner before
             self._others.forget()
-        kept = self._others.left(places, None if is_gone else expected, pose, self.seen_us if is_gone else None)
+        gone_us = self.seen_us if is_gone else None
+        kept = self._others.left(places, None if is_gone else expected, pose, gone_us, has_depth=has_depth)
         found, places = [found[k] for k in kept], [places[k] for k in kept]
         if not found:
             self._row = []
             return None
         best = self._nearest(found, places, expected, gate_m)
         strangers = [place for k, place in enumerate(places) if k != best]
-        self._others.meet(strangers, None if best is None else places[best], pose)
+        self._others.meet(strangers, None if best is None else places[best], pose, has_depth=has_depth)
         if best is None:
             self._row = []
             return None

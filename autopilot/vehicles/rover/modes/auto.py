@@ -60,7 +60,7 @@ class RoverHold(Hold):
         """Chooses the place to hold, once it stands."""
         context = self._context
         vel_north, vel_east, _ = context.state.estimate.vel_ned
-        if hypot(vel_north, vel_east) < _STANDING_M_S:
+        if hypot(vel_north, vel_east) < context.number("RO_SPEED_TH"):
             self._is_stopping = False
             self.target_ned, self.yaw = context.state.estimate.pos_ned, context.state.yaw_rad
             context.fly_to(self.target_ned, self.yaw)
