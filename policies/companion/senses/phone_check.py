@@ -189,8 +189,10 @@ class PhoneCheck:
         self._learn(owner[1], *last, is_next=since_s < _NEXT_S)
         if is_heard and odds[best] - max(mine, 0.0) > _SURE:
             return Word.ANOTHER, best
-        is_nobody = mine < -(_SURE if has_met_others else _SURE_ALONE)
-        return (Word.NOBODY if is_nobody else Word.AGREES), -1
+        if mine >= -(_SURE if has_met_others else _SURE_ALONE):
+            return Word.AGREES, -1
+        self._usual.off = None  # it was of somebody else
+        return Word.NOBODY, -1
 
     def _learn(self, fit: PhoneFit, last: Floats | None, last_vel: Floats | None, *, is_next: bool) -> None:
         """The phone's noise, of one report and the next, and its slow error if it fits."""
