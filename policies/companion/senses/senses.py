@@ -96,12 +96,12 @@ class Senses:
             return
         self.image_us = image.time_us
         down = rotated(inverse(pose.q_ned_from_frd), (0.0, 0.0, 1.0))
-        pixels, told = image.pixels, None
+        pixels, by_colours = image.pixels, None
         if not has_depth(pixels[..., 3]):
-            told = self._mono_depth.see(pixels, down, own.range_m * down[2])
-            pixels = np.concatenate([pixels[..., :3], told.depth[..., None]], -1)
+            by_colours = self._mono_depth.see(pixels, down, own.range_m * down[2])
+            pixels = np.concatenate([pixels[..., :3], by_colours.depth[..., None]], -1)
         found = self._detector.find(pixels, (down[0], down[1]))
-        if told is not None:
+        if by_colours is not None:
             found = [replace(detection, has_depth=False) for detection in found]
         found = [detection for detection in found if detection.probability >= _SURE]
         seen = self._owner_among(found, pose)
@@ -115,10 +115,10 @@ class Senses:
             self.bearing_rad = atan2(place[1] - pose.pos_ned[1], place[0] - pose.pos_ned[0])
             self.seen.see(place, pose, has_depth=seen.has_depth)
         owner_then = self._owner_then(image.time_us, own)
-        if told is None:
+        if by_colours is None:
             self.map.see(image.pixels[..., 3], pose, owner_then, own.boot_us)
         else:
-            self.map.guess(told, pose, owner_then, own.boot_us)
+            self.map.guess(by_colours, pose, owner_then, own.boot_us)
             if seen is not None:
                 self.map.sight(pose, place, own.boot_us)
 
