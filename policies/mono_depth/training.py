@@ -5,6 +5,7 @@ depth, to which trunks and people count more, since they are thin, and of whethe
 was trained on a GPU, with `--device cuda --rounds 120`; on a CPU it takes ten minutes for six rounds.
 """
 
+from io import BytesIO
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +17,7 @@ from rich.progress import track
 from torch import Tensor
 from torch.nn import functional
 
+from common.files import write_whole
 from common.intervals import rate
 from policies.mono_depth.network import BIN_BYTES, BINS, WEIGHTS, DepthNetwork, flat_ground, quantile_byte, shipped
 from policies.mono_depth.views import Views, views
@@ -113,7 +115,9 @@ def main(
     console = Console(highlight=False)
     network = shipped().eval() if judged else train(rounds, images, epochs, seed, device, console)
     if not judged:
-        torch.save({name: value.half() for name, value in network.state_dict().items()}, out)
+        weights = BytesIO()
+        torch.save({name: value.half() for name, value in network.state_dict().items()}, weights)
+        write_whole(out, weights.getvalue())
     for name, value in judge(network, views(Stage(7, is_test=True), 6400)).items():
         console.print(f"{name}: {value}")
 

@@ -52,8 +52,6 @@ class LocalMap:
         self._corner = (0, 0)  # cell indices of the grid's first cell
         self.has_depth = False
         """The last picture had depth, the last scan a return."""
-        self.is_known = False
-        """The last picture told depth, by a depth camera or by its colours."""
         self._rays_frd = _rays()
         near = np.arange(-_OWN_M, _OWN_M + CELL_M, CELL_M)
         self._own = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _OWN_M])
@@ -70,14 +68,14 @@ class LocalMap:
             now_us: the vehicle's clock.
         """
         self._follow(pose.pos_ned)
-        self.is_known = self.has_depth = has_depth(depth)
+        self.has_depth = has_depth(depth)
         if self.has_depth:
             self._take(depth, np.zeros(depth.shape, bool), pose, owner, now_us)
 
     def guess(self, seen: SeenDepth, pose: Pose, owner: tuple[Floats, Floats] | None, now_us: int) -> None:
         """Takes in what a picture's colours say, where there is no depth; people are no part of the map."""
         self._follow(pose.pos_ned)
-        self.is_known, self.has_depth = True, False
+        self.has_depth = False
         self._take(seen.depth, seen.is_person, pose, owner, now_us)
 
     def _take(
