@@ -112,3 +112,33 @@ def test_a_policy_that_wants_up_or_down_stays_between_the_heights(
     s = guard.settings
     assert s.height_min_m - 0.15 < min(heights_m)
     assert max(heights_m) < s.height_max_m + 0.15
+
+
+def searched(guard: Guard, own: Own, phone_m: float, seconds: float) -> list[tuple[float, float, float]]:
+    """Speeds ahead and aside, and yaw rates, of a search while the phone says that its owner is so far ahead."""
+    out, phone = [], Owner(has_velocity=True)
+    for k in range(round(seconds * 10)):
+        own.boot_us += 100_000
+        if k % 5 == 0:
+            phone.pos_ned = (own.pos_ned[0] + phone_m, 0.0, -1.0)
+            phone.count += 1
+        pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 200, np.uint8)
+        image = ImageFrame(own.boot_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
+        guard.senses.sense(own, phone, image)
+        velocity, yaw_rate = guard.filtered(((0.0, 0.0, 0.0), 0.0), own)
+        out.append((velocity[0], velocity[1], yaw_rate))
+    return out
+
+
+def test_a_search_looks_then_goes_round_then_turns_wherever_it_came_from(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, sees = scene
+    sees.is_there = False
+    guard.begin(own)
+    far = searched(guard, own, 20.0, 17.0)
+    assert max(abs(east) for _, east, _ in far) < 0.1
+    near = searched(guard, own, 5.0, 24.0)
+    rounds = [k for k, (_, east, _) in enumerate(near) if abs(east) > 0.3]
+    turns = [k for k, (*_, yaw_rate) in enumerate(near) if yaw_rate > 0.5]
+    assert 35 <= min(rounds) < max(rounds) < min(turns)
+    assert len(rounds) > 50
+    assert len(turns) > 50

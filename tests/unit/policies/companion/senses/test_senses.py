@@ -20,9 +20,10 @@ class Shows:
 
 
 class Scene:
-    def __init__(self) -> None:
+    def __init__(self, *, hears: bool = True) -> None:
         self.shows = Shows()
-        self.senses = Senses(detector=self.shows)  # type: ignore[arg-type]
+        self.senses = Senses(hears=hears, detector=self.shows)  # type: ignore[arg-type]
+        self.phone = Owner()
         self.own = Own(boot_us=0, pos_ned=(0.0, 0.0, -1.6), vel_ned=(0.0, 0.0, 0.0), range_m=1.6)
 
     def look(self, *places: tuple[float, float], times: int = 1) -> None:
@@ -31,7 +32,12 @@ class Scene:
             self.own.boot_us += 100_000
             pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 200, np.uint8)
             frame = ImageFrame(self.own.boot_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
-            self.senses.sense(self.own, Owner(), frame)
+            self.senses.sense(self.own, self.phone, frame)
+
+    def report(self, north_m: float, east_m: float) -> None:
+        """The phone says that its owner stands there."""
+        self.phone.pos_ned, self.phone.has_velocity = (north_m, east_m, -1.0), True
+        self.phone.count += 1
 
     @property
     def silence_s(self) -> float:
@@ -88,3 +94,32 @@ def test_an_owner_who_comes_back_elsewhere_is_nobody_else(scene: Scene) -> None:
     scene.look(times=12)
     scene.look((5.0, 2.0), times=30)
     assert scene.silence_s == 0.0
+
+
+def pass_by(scene: Scene) -> None:
+    """Somebody walks past an owner three metres ahead, whose phone says so."""
+    for k in range(60):
+        if k % 5 == 0:
+            scene.report(3.5, 1.0)
+        scene.look((3.0, 0.0), (4.5, -3.0 + 0.1 * k))
+
+
+def test_who_flies_by_sight_alone_finds_the_owner_again_after_somebody_has_passed() -> None:
+    scene = Scene(hears=False)
+    scene.look((3.0, 0.0), times=10)
+    pass_by(scene)
+    scene.look(times=15)
+    scene.look((3.0, 0.0), times=60)
+    assert scene.silence_s == 0.0
+
+
+def test_the_phone_finds_the_owner_again_where_others_were() -> None:
+    scene = Scene()
+    scene.look((3.0, 0.0), times=10)
+    pass_by(scene)
+    scene.look(times=15)
+    for _ in range(12):
+        scene.report(3.5, 1.0)
+        scene.look((3.0, 0.0), (6.0, 4.0), times=5)
+    assert scene.silence_s == 0.0
+    assert scene.senses.seen.now(scene.own.boot_us)[0][:2] == pytest.approx([3.0, 0.0], abs=0.3)
