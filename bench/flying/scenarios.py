@@ -81,22 +81,33 @@ def _rate(scenario: Scenario) -> float:
     return result.simulated_s / result.cpu_s
 
 
-def _ready_s() -> float:
-    """From the command to its end; before that each is flown twice, by processes that have flown others."""
+def require_same_logs(repeats: int) -> int:
+    """Flies every scenario that ships so often, by processes that have flown others; how many flights each time.
+
+    Raises:
+        WrongResult: one failed, or left other logs than before.
+    """
     scenarios = [read_scenario(path) for path in find_files([READY])]
     flights = [(scenario, seed) for scenario in scenarios for seed in scenario.seeds]
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(len(os.sched_getaffinity(0)), spawn, end_with_parent) as pool:
         first = list(pool.map(_logs_hash, flights))
-        again = list(pool.map(_logs_hash, reversed(flights)))[::-1]
-    for (scenario, seed), one, other in zip(flights, first, again, strict=True):
-        require(one == other, f"{scenario.name}, seed {seed}: other logs at its second flight")
+        for _ in range(repeats - 1):
+            again = list(pool.map(_logs_hash, reversed(flights)))[::-1]
+            for (scenario, seed), one, other in zip(flights, first, again, strict=True):
+                require(one == other, f"{scenario.name}, seed {seed}: other logs at another flight")
+    return len(flights)
+
+
+def _ready_s() -> float:
+    """From the command to its end; before that each is flown twice."""
+    count = require_same_logs(2)
 
     def once() -> float:
         start = time.perf_counter()
         done = subprocess.run([HONEYGUIDE, "test", "--ready"], capture_output=True, text=True, check=False)
         spent = time.perf_counter() - start
-        is_good = done.returncode == 0 and f"{len(flights)} of {len(flights)} passed" in done.stdout
+        is_good = done.returncode == 0 and f"{count} of {count} passed" in done.stdout
         require(is_good, done.stdout[-2000:] + done.stderr)
         return spent
 
@@ -159,3 +170,8 @@ def _test_s() -> float:
         return fmean(times[1 : 1 + TESTS]) - fmean(times[2 + TESTS :])
 
     return best_of(TRIES, once)
+
+
+if __name__ == "__main__":  # python -m bench.flying.scenarios REPEATS
+    flown, asked = require_same_logs(int(sys.argv[1])), sys.argv[1]
+    print(f"{flown} scenarios {asked} times: none failed, and each left the same logs every time")
