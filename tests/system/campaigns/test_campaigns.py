@@ -188,6 +188,7 @@ class Head:
     def end(self):
         os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait(60.0)
+        self._process.stdout.close()
 
 
 def workers_that_fly():

@@ -95,3 +95,4 @@ def test_ray_makes_the_same_dataset_when_a_worker_dies(tmp_path, undisturbed):
     finally:
         os.killpg(head.pid, signal.SIGKILL)
         head.wait(60.0)
+        head.stdout.close()
