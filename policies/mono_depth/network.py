@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from common.attitude import Vector, inverse, rotated
+from policies.image_layers import conv_block, load_weights
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, camera_mount
 
 BINS = 32
@@ -23,7 +24,6 @@ BLOCK = 2  # pixels
 BLOCKS = IMAGE_SIZE // BLOCK
 WEIGHTS = Path(__file__).parent / "weights.pt"
 _QUANTILE = 0.4  # nearer than the median: what may be there is taken to be there
-_SOMEBODY = 0.5  # probability from which a block is of a person
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,12 +35,6 @@ class SeenDepth:
     is_person: NDArray[np.bool_]
 
 
-def _block(inputs: int, outputs: int, *, stride: int = 1, dilation: int = 1, size: int = 3) -> nn.Sequential:
-    padding = dilation * (size // 2)
-    convolution = nn.Conv2d(inputs, outputs, size, stride=stride, padding=padding, dilation=dilation, bias=False)
-    return nn.Sequential(convolution, nn.BatchNorm2d(outputs), nn.SiLU())
-
-
 class DepthNetwork(nn.Module):
     """Colours (n, height, width, 3) and flat ground (n, height, width) in; logits (n, BINS + 1, BLOCKS, BLOCKS) out.
 
@@ -49,12 +43,12 @@ class DepthNetwork(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.halves = _block(4, 24, stride=2, size=5)
-        self.quarters = nn.Sequential(_block(24, 40, stride=2), _block(40, 40))
-        self.eighths = nn.Sequential(_block(40, 64, stride=2), _block(64, 64), _block(64, 64, dilation=2))
-        self.narrow = nn.Sequential(_block(64, 64), _block(64, 32, size=1))
-        self.up_quarters = nn.Sequential(_block(72, 40), _block(40, 24, size=1))
-        self.up_halves = nn.Sequential(_block(48, 32), nn.Conv2d(32, BINS + 1, 1))
+        self.halves = conv_block(4, 24, stride=2, size=5)
+        self.quarters = nn.Sequential(conv_block(24, 40, stride=2), conv_block(40, 40))
+        self.eighths = nn.Sequential(conv_block(40, 64, stride=2), conv_block(64, 64), conv_block(64, 64, dilation=2))
+        self.narrow = nn.Sequential(conv_block(64, 64), conv_block(64, 32, size=1))
+        self.up_quarters = nn.Sequential(conv_block(72, 40), conv_block(40, 24, size=1))
+        self.up_halves = nn.Sequential(conv_block(48, 32), nn.Conv2d(32, BINS + 1, 1))
 
     def forward(self, colours: Tensor, ground: Tensor) -> Tensor:
         levels = colours.permute(0, 3, 1, 2).float()
@@ -96,8 +90,7 @@ class MonoDepth:
                 torch.tensor([down_rdf], dtype=torch.float32), torch.tensor([height_m], dtype=torch.float32)
             )
             logits = self._network(torch.tensor(pixels[None, ..., :3]), ground)[0].numpy()
-        is_person = logits[BINS] > np.log(_SOMEBODY / (1.0 - _SOMEBODY))
-        return SeenDepth(_full(quantile_byte(logits[:BINS])), _full(is_person))
+        return SeenDepth(_full(quantile_byte(logits[:BINS])), _full(logits[BINS] > 0.0))
 
 
 def flat_ground(down_rdf: Tensor, height_m: Tensor) -> Tensor:
@@ -135,6 +128,5 @@ def _full(blocks: NDArray[Any]) -> NDArray[Any]:
 def shipped() -> DepthNetwork:
     """The network that ships."""
     network = DepthNetwork()
-    weights = torch.load(WEIGHTS, weights_only=True)
-    network.load_state_dict({name: value.float() for name, value in weights.items()})
+    load_weights(network, WEIGHTS)
     return network

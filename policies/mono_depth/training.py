@@ -2,10 +2,9 @@
 
 Images are rendered, depths come from the renderer; no policy, no flight, no reward. Cross-entropy over the bins of
 depth, to which trunks and people count more, since they are thin, and of whether somebody is there. The one that ships
-was trained on a GPU, with `--device cuda --rounds 120`; on a CPU it takes ten minutes for six rounds.
+was trained on a GPU, with `--device cuda --rounds 36`.
 """
 
-from io import BytesIO
 from pathlib import Path
 from typing import Annotated
 
@@ -17,8 +16,8 @@ from rich.progress import track
 from torch import Tensor
 from torch.nn import functional
 
-from common.files import write_whole
 from common.intervals import rate
+from policies.image_layers import save_weights
 from policies.mono_depth.network import BIN_BYTES, BINS, WEIGHTS, DepthNetwork, flat_ground, quantile_byte, shipped
 from policies.mono_depth.views import Views, views
 from policies.person_detector.scenes import WORLDS, Stage
@@ -115,9 +114,7 @@ def main(
     console = Console(highlight=False)
     network = shipped().eval() if judged else train(rounds, images, epochs, seed, device, console)
     if not judged:
-        weights = BytesIO()
-        torch.save({name: value.half() for name, value in network.state_dict().items()}, weights)
-        write_whole(out, weights.getvalue())
+        save_weights(network, out)
     for name, value in judge(network, views(Stage(7, is_test=True), 6400)).items():
         console.print(f"{name}: {value}")
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from common.attitude import Vector, levelled, rotated
+from policies.image_layers import conv_block, load_weights
 from policies.tasks.follow_me.observe import HFOV_DEG, LENS_FRD, camera_mount, depth_of
 
 CELLS = 16  # of the map, in rows and columns
@@ -45,24 +46,18 @@ class Detection:
     """The range is of depth; else of how large they look."""
 
 
-def _block(inputs: int, outputs: int, *, stride: int = 1, dilation: int = 1, size: int = 3) -> list[nn.Module]:
-    padding = dilation * (size // 2)
-    convolution = nn.Conv2d(inputs, outputs, size, stride=stride, padding=padding, dilation=dilation, bias=False)
-    return [convolution, nn.BatchNorm2d(outputs), nn.SiLU()]
-
-
 class DetectorNetwork(nn.Module):
     """Images (n, height, width, 4) in; logits of a chest, log ranges, logits of any limb out, (n, CELLS, CELLS)."""
 
     def __init__(self) -> None:
         super().__init__()
         self.layers = nn.Sequential(
-            *_block(5, 24, stride=2, size=5),
-            *_block(24, 32, stride=2),
-            *_block(32, 48),
-            *_block(48, 48, dilation=2),
-            *_block(48, 48, dilation=4),
-            *_block(48, 48),
+            *conv_block(5, 24, stride=2, size=5),
+            *conv_block(24, 32, stride=2),
+            *conv_block(32, 48),
+            *conv_block(48, 48, dilation=2),
+            *conv_block(48, 48, dilation=4),
+            *conv_block(48, 48),
             nn.Conv2d(48, 3, 1),
         )
         self.register_buffer("calibration", torch.tensor([1.0, 0.0]))  # of logits: factor and offset
@@ -185,6 +180,5 @@ def _chest_hfrd(at: tuple[float, float], range_m: float, width: int, down_frd: t
 def shipped() -> DetectorNetwork:
     """The network that ships."""
     network = DetectorNetwork()
-    weights = torch.load(WEIGHTS, weights_only=True)
-    network.load_state_dict({name: value.float() for name, value in weights.items()})
+    load_weights(network, WEIGHTS)
     return network

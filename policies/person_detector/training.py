@@ -5,7 +5,6 @@ who is in which cell, an absolute error of the logarithm for how far away, then 
 that makes probabilities true on validation worlds. The judgement is on worlds of a further seed.
 """
 
-from io import BytesIO
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,8 +17,8 @@ from rich.progress import track
 from torch import Tensor
 from torch.nn import functional
 
-from common.files import write_whole
 from common.intervals import rate
+from policies.image_layers import save_weights
 from policies.person_detector.detector import WEIGHTS, DetectorNetwork, shipped
 from policies.person_detector.scenes import Scenes, scenes
 
@@ -130,9 +129,7 @@ def main(
     console = Console(highlight=False)
     network = shipped().eval() if judged else train(images, epochs, seed, console)
     if not judged:
-        weights = BytesIO()
-        torch.save({name: value.half() for name, value in network.state_dict().items()}, weights)
-        write_whole(out, weights.getvalue())
+        save_weights(network, out)
     found = judge(network, scenes(6400, 7, is_test=True))
     for name, value in found.items():
         console.print(f"{name}: {value}")

@@ -29,6 +29,7 @@ PLACES = {
     "gym": ("policies/__init__.py", "policies/tasks"),
     "learn": (
         *("policies/companion", "policies/datasets", "policies/experts", "policies/learn", "policies/offline"),
+        "policies/image_layers.py",
         "policies/tracker.py",
         *("policies/mono_depth", "policies/person_detector", "mission/benchmark/any_pilot.py"),
         *("mission/train", "mission/video/rtp_video.py", "mission/video/video_file.py"),

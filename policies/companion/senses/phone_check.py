@@ -171,7 +171,7 @@ class PhoneCheck:
             has_met_others: some may have been taken for the owner not long ago; without, nobody is doubted lightly.
         """
         everyone = [*others, *([owner] if owner is not None else [])]
-        last = None if owner is None else (owner[1].apart, owner[1].apart_vel)
+        last = (None, None) if owner is None else (owner[1].apart, owner[1].apart_vel)
         for who, fit in everyone:
             fit.hear(phone, phone_vel, who, since_s, self._usual)
         for _, fit in others:
@@ -182,7 +182,7 @@ class PhoneCheck:
         odds = [self._usual.odds(fit) for _, fit in others]
         best = max(range(len(others)), key=odds.__getitem__, default=-1)
         is_heard = best >= 0 and others[best][1].reports >= _HEARD
-        if owner is None or last is None:
+        if owner is None:
             fits = has_met_others and is_heard and odds[best] > _FITS
             return (Word.ANOTHER, best) if fits else (Word.AGREES, -1)
         mine = self._usual.odds(owner[1])
