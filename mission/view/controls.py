@@ -236,12 +236,15 @@ class Controls:
 
     async def _get_ready(self, drone: Drone) -> None:
         """Says at once why the vehicle cannot be armed; waits only while that may end by itself."""
+        if drone.is_armed:
+            return
         state, commander = self.flight.controller.state, self.flight.controller.commander
-        reasons = commander.check_arming()
-        if not reasons or drone.is_armed:
+        has_crashed = self.flight.is_crashed  # it may lie upright, with nothing that the vehicle itself minds
+        reasons = (("it has crashed",) if has_crashed else ()) + tuple(commander.check_arming())
+        if not reasons:
             return
         why = f"cannot be armed: {', '.join(reasons)}"
-        if self.flight.is_crashed or state.time_us - state.boot_us > SETTLES_S * 1e6:
+        if has_crashed or state.time_us - state.boot_us > SETTLES_S * 1e6:
             raise ScriptError(why)
         self._say(f"waits: {why}")
         await drone.wait_ready(SETTLES_S)

@@ -107,6 +107,17 @@ def test_take_off_after_a_crash_says_at_once_why_not_and_restart_helps(page):
     flight.close()
 
 
+def test_a_crashed_vehicle_that_lies_upright_does_not_take_off_either(page, monkeypatch):
+    flight = Flight(FlightConfig(world=PLAIN))
+    view = LiveView(flight, page)
+    said_after(flight, view, 30.0, lambda: not flight.controller.commander.check_arming())
+    monkeypatch.setattr(Flight, "is_crashed", True)
+    buttons(page)["Take off"]()
+    assert "Take off: cannot be armed: it has crashed" in said_after(flight, view, 0.1)
+    assert not flight.controller.state.is_armed
+    flight.close()
+
+
 def test_a_restart_in_flight_puts_it_on_its_pad_with_a_full_battery_and_its_mission_flies_again(page):
     flight = Flight(FlightConfig(world=PLAIN))
     view = LiveView(flight, page, path_ned=[(0.0, 0.0, -5.0), (5.0, 0.0, -5.0)])
