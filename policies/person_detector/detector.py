@@ -28,6 +28,8 @@ _SAME_BODY = 0.15  # likewise, of pixels of one body
 _BODY_PX = (8, 4)  # to either side of a chest, where its body is looked for
 _COLOURS_SHORT = 1.12  # by which ranges by colours alone are too short; measured in flights
 _HALF_BODY_M = 0.09  # from the skin to the middle; measured in flights
+_CHEST_M = (0.12, 0.1, 0.3)  # aside, up and down of its middle: all of it is shirt
+_DARK = 0.2  # of the image's brightness: darker than this, a colour is noise
 WEIGHTS = Path(__file__).parent / "weights.pt"
 _HALF_WIDTH = np.tan(np.radians(0.5 * HFOV_DEG))
 
@@ -44,6 +46,8 @@ class Detection:
     """Column and row of it."""
     has_depth: bool = True
     """The range is of depth; else of how large they look."""
+    colours: NDArray[np.float64] | None = None
+    """Of their chest: logarithms of red and blue over green, and of brightness over the image's; None: not seen."""
 
 
 class DetectorNetwork(nn.Module):
@@ -111,7 +115,8 @@ class PersonDetector:
                 range_m *= _COLOURS_SHORT
             chest = _chest_hfrd(at, range_m, pixels.shape[1], down_frd)
             probability = 1.0 / (1.0 + exp(-float(scores[row, column])))
-            found.append(Detection(probability, chest, at, has_depth=range_m != guess_m * _COLOURS_SHORT))
+            has_depth = range_m != guess_m * _COLOURS_SHORT
+            found.append(Detection(probability, chest, at, has_depth, _chest_colours(pixels, at, range_m)))
         return sorted(found, key=lambda detection: -detection.probability)
 
 
@@ -175,6 +180,20 @@ def _chest_hfrd(at: tuple[float, float], range_m: float, width: int, down_frd: t
     ray *= range_m / np.linalg.norm(ray)
     at_lens = rotated(camera_mount(), ray.tolist())
     return levelled([a + b for a, b in zip(at_lens, LENS_FRD, strict=True)], down_frd)
+
+
+def _chest_colours(pixels: NDArray[np.uint8], at: tuple[float, float], range_m: float) -> NDArray[np.float64] | None:
+    """What their chest looks like: of the middle pixel of each colour."""
+    width = pixels.shape[1]
+    aside, up, down = (max(m * 0.5 * width / (_HALF_WIDTH * range_m), 0.5) for m in _CHEST_M)
+    columns = slice(max(round(at[0] - aside), 0), round(at[0] + aside))
+    rows = slice(max(round(at[1] - up), 0), round(at[1] + down))
+    chest = pixels[rows, columns, :3].reshape(-1, 3)
+    if len(chest) == 0:
+        return None
+    brightness = float(pixels[..., :3].mean()) + 1.0
+    red, green, blue = np.log(np.median(chest, axis=0) / brightness + _DARK)
+    return np.array([red - green, blue - green, (red + green + blue) / 3.0])
 
 
 def shipped() -> DetectorNetwork:

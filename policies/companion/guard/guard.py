@@ -107,7 +107,9 @@ class Guard:
         s = self.settings
         if age_s > s.image_stop_s:
             return Stance.BLIND
-        if silence_s > s.search_s or (self.stance is Stance.SEARCH and silence_s > s.slow_s):
+        among = self.senses.is_heard and self.senses.has_met_others
+        search_s = s.search_among_s if among else s.search_s
+        if silence_s > search_s or (self.stance is Stance.SEARCH and silence_s > s.slow_s):
             return Stance.SEARCH
         if silence_s > s.stop_s:
             return Stance.STOP

@@ -24,6 +24,8 @@ class GuardSettings(BaseModel):
     """... until it stands."""
     search_s: float = Field(default=5.0, gt=0.0)
     """After so long it searches: towards the phone, if that is heard; otherwise it turns round where it is."""
+    search_among_s: float = Field(default=2.5, gt=0.0)
+    """The same where others were met not long ago and the phone is heard: the owner goes on, behind one of them."""
     lost_s: float = Field(default=60.0, gt=0.0)
     """After so long control goes back, in Hold."""
     search_speed: float = Field(default=4.0, gt=0.0)
@@ -32,7 +34,7 @@ class GuardSettings(BaseModel):
     """It comes no nearer to where the phone says."""
     search_round_speed: float = Field(default=1.5, ge=0.0)
     """[m/s] round it, where nobody is seen there."""
-    search_height_m: float = Field(default=2.6, gt=0.0)
+    search_height_m: float = Field(default=2.9, gt=0.0)
     """Above the ground, where it waits and searches: over people, under crowns."""
     search_yaw_rate: float = Field(default=0.6, gt=0.0)
     """[rad/s]"""

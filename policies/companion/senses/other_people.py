@@ -1,7 +1,7 @@
 """People who are not the owner, followed from image to image so that they are not taken for them.
 
-In: the places where somebody is seen, and where the owner is expected. Out: those that are not known to be somebody
-else's. Who is seen is first matched with whom is expected nearest, the owner among them.
+In: sights of people, and where the owner is expected. Out: those that are not known to be somebody else's. Who is
+seen is first matched with whom is expected nearest, the owner among them; looks count in it.
 """
 
 from dataclasses import dataclass
@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from policies.companion.senses.looks import Looks, likeness
 from policies.companion.senses.phone_check import PhoneFit, Suitor
 from policies.companion.senses.poses import Pose
-from policies.companion.senses.seen_owner import PersonNow, SeenOwner
+from policies.companion.senses.seen_owner import PersonNow, SeenOwner, Sight
 
 Floats = NDArray[np.float64]
 _MAX = 6
@@ -19,6 +20,7 @@ _NEAR_M = 1.0  # from where they are expected
 _FORGOTTEN_US = 1_500_000
 _APART_M = 0.6  # nearer to somebody, a second one is a part of them
 _FAVOUR_M = 0.25  # so much farther off the owner is still the likelier
+_LIKE_M = 0.2  # and who looks alike, for each logarithm
 _LATELY_US = 600_000
 _TOGETHER_US = 300_000  # who was there so long before the owner went is not the owner
 _WALKS_M = 1.0
@@ -38,6 +40,9 @@ class _Known:
     first_ned: Floats  # and where [m]
     fit: PhoneFit
 
+    def likeness(self, sight: Sight) -> float:
+        return likeness(Looks(sight.colours, 1), self.person.looks)
+
 
 class OtherPeople:
     """Those round one vehicle."""
@@ -48,16 +53,16 @@ class OtherPeople:
         """When one of them was seen last who walked: a trunk that the detector takes for somebody does not."""
 
     def left(
-        self, places: list[Floats], owner: Floats | None, pose: Pose, gone_us: int | None = None, *, has_depth: bool
+        self, sights: list[Sight], owner: Floats | None, likeness_of: list[float], pose: Pose, gone_us: int | None = None
     ) -> list[int]:
-        """Indices of the places that are nobody's whom it knows, the owner's among them; the others are taken in.
+        """Indices of the sights that are of nobody whom it knows, the owner's among them; the others are taken in.
 
         Args:
-            places: [m] where somebody is seen, ned.
+            sights: of one image.
             owner: [m] where the owner is expected; None: nobody knows.
+            likeness_of: each to the owner.
             pose: when and from where they were seen.
             gone_us: when the owner was seen last, if they are gone: who was met since may be the owner.
-            has_depth: their ranges are measured.
         """
         if gone_us is not None:
             self._known = [one for one in self._known if one.met_us < gone_us - _TOGETHER_US]
@@ -65,22 +70,24 @@ class OtherPeople:
         expected = {k: one.person.now(pose.time_us)[0] for k, one in enumerate(self._known)}
         if owner is not None:
             expected[_OWNER] = owner
-        pairs = sorted(
-            (float(np.hypot(*(place - where)[:2])) - (_FAVOUR_M if who == _OWNER else 0.0), k, who)
-            for k, place in enumerate(places)
-            for who, where in expected.items()
-        )
-        taken: dict[int, int] = {}  # place: who
-        for off_m, k, who in pairs:
-            if off_m < _NEAR_M and k not in taken and who not in taken.values():
+        pairs = []
+        for k, sight in enumerate(sights):
+            for who, where in expected.items():
+                off_m = sight.off_m(where) - (_FAVOUR_M if who == _OWNER else 0.0)
+                alike = likeness_of[k] if who == _OWNER else self._known[who].likeness(sight)
+                if off_m < _NEAR_M:
+                    pairs.append((off_m - _LIKE_M * alike, k, who))
+        taken: dict[int, int] = {}  # sight: who
+        for _, k, who in sorted(pairs):
+            if k not in taken and who not in taken.values():
                 taken[k] = who
         for k, who in taken.items():
             if who != _OWNER:
                 one = self._known[who]
-                one.person.see(places[k], pose, has_depth=has_depth)
-                if float(np.hypot(*(places[k] - one.first_ned)[:2])) > _WALKS_M:
+                one.person.see(sights[k], pose)
+                if sights[k].off_m(one.first_ned) > _WALKS_M:
                     self.met_us = pose.time_us
-        return [k for k in range(len(places)) if taken.get(k, _OWNER) == _OWNER]
+        return [k for k in range(len(sights)) if taken.get(k, _OWNER) == _OWNER]
 
     def forget(self) -> None:
         """Anybody may be the owner from now on."""
@@ -88,7 +95,7 @@ class OtherPeople:
 
     def heard(self, time_us: int) -> list[Suitor]:
         """Those who were seen lately, in order, and how well they fit the phone."""
-        return [(one.person.person_now(time_us), one.fit) for one in self._lately(time_us)]
+        return [Suitor(one.person.person_now(time_us), one.fit, one.person.looks) for one in self._lately(time_us)]
 
     def now(self, time_us: int) -> list[PersonNow]:
         """What is known of those who were seen lately and walk: whom a trunk is taken for does not."""
@@ -111,13 +118,13 @@ class OtherPeople:
     def _lately(self, time_us: int) -> list[_Known]:
         return [one for one in self._known if time_us - one.person.time_us < _LATELY_US]
 
-    def meet(self, places: list[Floats], owner: Floats | None, pose: Pose, *, has_depth: bool) -> None:
-        """Somebody new is at each of these places, but for what may be a part of the owner or of who is known."""
+    def meet(self, sights: list[Sight], owner: Floats | None, pose: Pose) -> None:
+        """Each of these is somebody new, but for what may be a part of the owner or of who is known."""
         known = [one.person.now(pose.time_us)[0] for one in self._known]
-        for place in places[: max(_MAX - len(self._known), 0)]:
+        for sight in sights[: max(_MAX - len(self._known), 0)]:
             beside = [*known, *([owner] if owner is not None else [])]
-            if any(float(np.hypot(*(place - other)[:2])) < _APART_M for other in beside):
+            if any(sight.off_m(other) < _APART_M for other in beside):
                 continue
-            one = _Known(SeenOwner(), pose.time_us, place, PhoneFit())
-            one.person.see(place, pose, has_depth=has_depth)
+            one = _Known(SeenOwner(), pose.time_us, sight.place_ned, PhoneFit())
+            one.person.see(sight, pose)
             self._known.append(one)

@@ -1,9 +1,9 @@
-"""Whether the phone is with whom is taken for the owner: its reports against everybody who is seen.
+"""Whether the owner is whom is taken for them: the phone's reports, and looks, against everybody who is seen.
 
 In: each report, and where everybody is and goes. Out: who else it would rather be, or that it is none of them. Who
 has the phone goes as it says, and is off from where it says by an error that changes slowly. How much likelier each
 report is of a person than of somebody unseen is summed up for each (a logarithm of likelihood ratios), up to a bound,
-so that old reports are outweighed in seconds, and compared.
+so that old reports are outweighed in seconds, and compared; how they look beside the owner counts too.
 """
 
 from collections.abc import Sequence
@@ -14,6 +14,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
+from policies.companion.senses.looks import Looks, likeness
 from policies.companion.senses.seen_owner import PersonNow
 
 Floats = NDArray[np.float64]
@@ -36,6 +37,10 @@ _HEARD = 2  # after so many reports
 _KNOWN = 8  # after so many the phone's noise is
 _NEXT_S = 1.6  # a report that comes later than this is not the next
 _STEADY = 0.1  # of each report: how soon a worse phone is noticed
+_UNLIKE = -3.0  # likeness of who looks otherwise: old reports count for them no more
+_ALIKE = 0.5  # and of who looks the same
+_CERTAIN = 6.0  # of reports, from which what somebody wears is what the owner wears
+_WEARS = 20  # reports, over which it is learned what the owner wears
 
 
 class Word(Enum):
@@ -44,9 +49,6 @@ class Word(Enum):
     AGREES = 0
     ANOTHER = 1  # it is somebody else of those seen
     NOBODY = 2  # it is none of them
-
-
-Suitor = tuple[PersonNow, "PhoneFit"]  # somebody, and how well they fit the phone
 
 
 @dataclass(slots=True)
@@ -121,14 +123,29 @@ class PhoneFit:
         self.off = self.off + gain * astray
         self.var *= 1.0 - gain
 
+    def forget(self) -> None:
+        """What was heard was of somebody else too."""
+        self.off, self.var, self.odds, self.reports, self.apart, self.apart_vel = None, 0.0, 0.0, 0, None, None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Suitor:
+    """Somebody who may be the owner."""
+
+    now: PersonNow
+    fit: PhoneFit
+    looks: Looks = field(default_factory=Looks)
+
 
 @dataclass(slots=True)
 class Usual:
-    """What is known of the phone."""
+    """What is known of the owner and their phone."""
 
     noise: PhoneNoise = field(default_factory=PhoneNoise)
     off: Floats | None = None
     """[m] Its slow error, level, of who was surely the owner; None: not known yet."""
+    looks: Looks = field(default_factory=Looks)
+    """Of who was surely the owner."""
 
     def prior(self, apart: Floats) -> tuple[Floats, float]:
         """What error is expected of somebody new, so far from the phone: as known, or if that is far off, any."""
@@ -138,12 +155,28 @@ class Usual:
         known = self.off.copy(), self.noise.place * _PRIOR_VAR
         return min((known, anything), key=lambda one: float((apart - one[0]) @ (apart - one[0])) / one[1])
 
-    def odds(self, fit: PhoneFit) -> float:
-        """Of somebody, less what speaks against so sudden a change of the phone's error."""
+    def odds(self, who: Suitor) -> float:
+        """Of somebody, by reports and looks."""
+        return self.heard(who.fit) + likeness(who.looks, self.looks)
+
+    def heard(self, fit: PhoneFit) -> float:
+        """By reports, less what speaks against so sudden a change of the phone's error."""
         if self.off is None or fit.off is None:
             return fit.odds
         changed = fit.off - self.off
         return fit.odds - min(0.5 * float(changed @ changed) / (self.noise.place * _CHANGED_VAR), _CHANGED_MAX)
+
+    def doubt(self, owner: Suitor) -> None:
+        """The owner is found by reports; who looks otherwise than they was somebody else."""
+        if likeness(owner.looks, self.looks) < 0.0:
+            self.looks = Looks()
+
+    def learn(self, owner: Suitor) -> None:
+        """Takes in who is the owner."""
+        if owner.fit.off is not None:
+            self.off = owner.fit.off.copy()
+        if self.heard(owner.fit) > _CERTAIN:
+            self.looks.see(owner.looks.mean, _WEARS)
 
 
 class PhoneCheck:
@@ -170,35 +203,63 @@ class PhoneCheck:
             others: who else is seen.
             has_met_others: some may have been taken for the owner not long ago; without, nobody is doubted lightly.
         """
-        everyone = [*others, *([owner] if owner is not None else [])]
-        last = (None, None) if owner is None else (owner[1].apart, owner[1].apart_vel)
-        for who, fit in everyone:
-            fit.hear(phone, phone_vel, who, since_s, self._usual)
-        for _, fit in others:
-            fit.odds = min(max(fit.odds, -_LEAST), _MOST)
+        swapped = None if owner is None else self._swapped(owner, others)
+        if swapped is not None:
+            return Word.ANOTHER, swapped
+        last = (None, None) if owner is None else (owner.fit.apart, owner.fit.apart_vel)
+        for who in [*others, *([owner] if owner is not None else [])]:
+            who.fit.hear(phone, phone_vel, who.now, since_s, self._usual)
+        for who in others:
+            who.fit.odds = min(max(who.fit.odds, -_LEAST), _MOST)
         if owner is not None:
             least = -_MOST if self._usual.noise.steps >= _KNOWN else 0.0  # not doubted before
-            owner[1].odds = min(max(owner[1].odds, least), _MOST)
-        odds = [self._usual.odds(fit) for _, fit in others]
+            most = 0.0 if likeness(owner.looks, self._usual.looks) < _UNLIKE else _MOST
+            owner.fit.odds = min(max(owner.fit.odds, least), most)
+        odds = [self._usual.odds(who) for who in others]
         best = max(range(len(others)), key=odds.__getitem__, default=-1)
-        is_heard = best >= 0 and others[best][1].reports >= _HEARD
+        is_heard = best >= 0 and others[best].fit.reports >= _HEARD
         if owner is None:
-            fits = has_met_others and is_heard and odds[best] > _FITS
-            return (Word.ANOTHER, best) if fits else (Word.AGREES, -1)
-        mine = self._usual.odds(owner[1])
-        self._learn(owner[1], *last, is_next=since_s < _NEXT_S)
+            if not (has_met_others and is_heard and odds[best] > _FITS):
+                return Word.AGREES, -1
+            self._usual.doubt(others[best])
+            return Word.ANOTHER, best
+        mine = self._usual.odds(owner)
+        self._learn(owner, *last, is_next=since_s < _NEXT_S)
+        if mine > _FITS + max([0.0, *odds]):
+            self._usual.learn(owner)
         if is_heard and odds[best] - max(mine, 0.0) > _SURE:
+            self._usual.doubt(others[best])
             return Word.ANOTHER, best
         if mine >= -(_SURE if has_met_others else _SURE_ALONE):
             return Word.AGREES, -1
         self._usual.off = None  # it was of somebody else
+        if likeness(owner.looks, self._usual.looks) > 0.0:
+            self._usual.looks = Looks()  # and they too
         return Word.NOBODY, -1
 
-    def _learn(self, fit: PhoneFit, last: Floats | None, last_vel: Floats | None, *, is_next: bool) -> None:
-        """The phone's noise, of one report and the next, and its slow error if it fits."""
+    def likeness(self, colours: Floats | None) -> float:
+        """Logarithm of how much likelier the owner is who looks like that in an image; 0: nobody knows."""
+        return likeness(Looks(colours, 1), self._usual.looks)
+
+    def _swapped(self, owner: Suitor, others: Sequence[Suitor]) -> int | None:
+        """Who looks like the owner, where who is taken for them does not: one was taken for the other in passing.
+
+        What was heard was of either of them then.
+        """
+        if likeness(owner.looks, self._usual.looks) > _UNLIKE:
+            return None
+        alike = [likeness(who.looks, self._usual.looks) for who in others]
+        best = max(range(len(others)), key=alike.__getitem__, default=-1)
+        if best < 0 or alike[best] < _ALIKE:
+            return None
+        owner.fit.forget()
+        others[best].fit.forget()
+        return best
+
+    def _learn(self, owner: Suitor, last: Floats | None, last_vel: Floats | None, *, is_next: bool) -> None:
+        """The phone's noise, of one report and the next."""
+        fit = owner.fit
         if is_next and last is not None and fit.apart is not None:
             has_vel = last_vel is not None and fit.apart_vel is not None
             step_vel = fit.apart_vel - last_vel if has_vel else None  # type: ignore[operator]
             self._usual.noise.learn(fit.apart - last, step_vel)
-        if fit.off is not None and self._usual.odds(fit) > _FITS:
-            self._usual.off = fit.off.copy()

@@ -1,4 +1,7 @@
-"""Somebody's place and velocity by sights, the owner's first of all, by the filter that policies are trained with."""
+"""Somebody by sights, the owner first of all: place, velocity and looks.
+
+The filter is the one that policies are trained with.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,10 +11,27 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.warp_start import start_warp
+from policies.companion.senses.looks import Looks
 from policies.companion.senses.poses import Pose
 from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, now_rows, see_rows
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """Somebody in an image."""
+
+    place_ned: Floats
+    """[m] Of the chest, (3,)."""
+    has_depth: bool
+    """Their range is measured."""
+    colours: Floats | None = None
+    """As a detection has them."""
+
+    def off_m(self, place: Floats) -> float:
+        """From a place, level."""
+        return float(np.hypot(*(self.place_ned - place)[:2]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,14 +70,16 @@ class SeenOwner:
         """Of the newest sight."""
         self.sights = 0
         """So many there were."""
+        self.looks = Looks()
 
-    def see(self, place_ned: Floats, pose: Pose, *, has_depth: bool) -> None:
-        """An image, newer than the last, shows the owner's chest at a place [m]."""
+    def see(self, sight: Sight, pose: Pose) -> None:
+        """An image, newer than the last, shows them."""
         self._row["age_s"] = max(pose.time_us - self.time_us, 0) * 1e-6
         self.time_us = pose.time_us
         self.sights += 1
-        self._place[0], self._eye[0] = place_ned, pose.pos_ned
-        self._has_depth[0], self._age_s[0] = int(has_depth), 0.0
+        self.looks.see(sight.colours)
+        self._place[0], self._eye[0] = sight.place_ned, pose.pos_ned
+        self._has_depth[0], self._age_s[0] = int(sight.has_depth), 0.0
         self._see.launch()
 
     def at(self, time_us: int) -> Any:

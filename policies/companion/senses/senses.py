@@ -3,7 +3,7 @@
 In: images, telemetry, the phone's reports. Out: the owner's place and velocity by sights alone, the track of sights and
 phone together, since when the owner has not been seen, and a level map of what is solid. The owner is whom the
 detector sees where they are expected; after a while without them, only who is there in several images in a row, and
-where others were met lately only whom the phone says.
+where others were met lately only whom phone and looks say.
 """
 
 from dataclasses import replace
@@ -18,9 +18,9 @@ from policies.companion.observation import REPORT_LAG_S
 from policies.companion.owner_watch import OwnerWatch, sighting_from
 from policies.companion.senses.local_map import LocalMap, has_depth
 from policies.companion.senses.other_people import OtherPeople
-from policies.companion.senses.phone_check import PhoneCheck, PhoneFit, Word
+from policies.companion.senses.phone_check import PhoneCheck, PhoneFit, Suitor, Word
 from policies.companion.senses.poses import Pose, PoseHistory
-from policies.companion.senses.seen_owner import PersonNow, SeenOwner
+from policies.companion.senses.seen_owner import PersonNow, SeenOwner, Sight
 from policies.companion.vehicle_link import Own, Owner
 from policies.mono_depth.network import MonoDepth
 from policies.person_detector.detector import Detection, PersonDetector
@@ -40,6 +40,7 @@ _STRANGE_S = 4.0  # and after so long anybody may be them
 _NEW_US = 1_000_000  # after so long with somebody in sight they are the owner, if nobody was so before
 _IN_A_ROW = 4  # as many images must show them, one beside the other
 _BESIDE_M = 1.0
+_UNLIKE = -3.0  # likeness from which somebody is not the owner where others are about
 
 
 class Senses:
@@ -111,9 +112,10 @@ class Senses:
             if self.silence_s(own) > _GONE_S:  # found again, or for the first time: who it is the phone has yet to say
                 self._fit = PhoneFit()
             self.seen_us = image.time_us
-            place = ned_of(seen.chest_hfrd, pose)
+            sight = _sight(seen, pose)
+            place = sight.place_ned
             self.bearing_rad = atan2(place[1] - pose.pos_ned[1], place[0] - pose.pos_ned[0])
-            self.seen.see(place, pose, has_depth=seen.has_depth)
+            self.seen.see(sight, pose)
         owner_then = self._owner_then(image.time_us, own)
         if by_colours is None:
             self.map.see(image.pixels[..., 3], pose, owner_then, own.boot_us)
@@ -134,9 +136,9 @@ class Senses:
             phone,
             phone_vel if owner.has_velocity else None,
             min(since_s, PHONE_OLD_S),
-            (self.seen.person_now(own.boot_us), self._fit) if is_seen else None,
+            Suitor(self.seen.person_now(own.boot_us), self._fit, self.seen.looks) if is_seen else None,
             self._others.heard(own.boot_us),
-            has_met_others=self._has_met_others(own.boot_us),
+            has_met_others=self.has_met_others,
         )
         expected = self._phone.owner(phone)
         self._phone_ned = None if expected is None else np.array([*expected, owner.pos_ned[2]])
@@ -151,10 +153,11 @@ class Senses:
             self.seen_us, self.seen, self._fit = own.boot_us - _DOUBTED_US, SeenOwner(), PhoneFit()
         self.watch.forget()
 
-    def _has_met_others(self, now_us: int) -> bool:
+    @property
+    def has_met_others(self) -> bool:
         """Some were there not long ago, and may have been taken for the owner."""
         met_us = self._others.met_us
-        return met_us is not None and now_us - met_us < _MET_US
+        return met_us is not None and self._boot_us - met_us < _MET_US
 
     def silence_s(self, own: Own) -> float:
         """Since the owner was seen."""
@@ -194,39 +197,37 @@ class Senses:
         silence_s = max(pose.time_us - self.seen_us, 0) * 1e-6 if self.seen_us is not None else inf
         is_gone = silence_s > _GONE_S
         expected, gate_m = self._expected(pose.time_us, silence_s)
-        places = [ned_of(detection.chest_hfrd, pose) for detection in found]
-        has_depth = all(detection.has_depth for detection in found)
-        if is_gone and self.is_heard and self._has_met_others(pose.time_us):  # the phone says who of them it is
-            new = [places[k] for k in self._others.left(places, None, pose, has_depth=has_depth)]
-            self._others.meet(new, None, pose, has_depth=has_depth)
+        sights = [_sight(detection, pose) for detection in found]
+        has_met_others = self.has_met_others
+        alike = [self._phone.likeness(sight.colours) if has_met_others else 0.0 for sight in sights]
+        if is_gone and self.is_heard and has_met_others:  # the phone says who of them it is
+            new = [sights[k] for k in self._others.left(sights, None, alike, pose)]
+            self._others.meet(new, None, pose)
             self._row = []
             return None
         if silence_s > _STRANGE_S:  # or nobody was the owner before
             self._others.forget()
         gone_us = self.seen_us if is_gone else None
-        kept = self._others.left(places, None if is_gone else expected, pose, gone_us, has_depth=has_depth)
-        found, places = [found[k] for k in kept], [places[k] for k in kept]
-        if not found:
-            self._row = []
-            return None
-        best = self._nearest(found, places, expected, gate_m)
-        strangers = [place for k, place in enumerate(places) if k != best]
-        self._others.meet(strangers, None if best is None else places[best], pose, has_depth=has_depth)
+        left = self._others.left(sights, None if is_gone else expected, alike, pose, gone_us)
+        may_be = [k for k in left if alike[k] > _UNLIKE]
+        best = self._nearest(found, sights, may_be, expected, gate_m) if may_be else None
+        strangers = [sights[k] for k in left if k != best]
+        self._others.meet(strangers, None if best is None else sights[best].place_ned, pose)
         if best is None:
             self._row = []
             return None
-        return found[best] if not is_gone or self._is_there_to_stay(places[best]) else None
+        return found[best] if not is_gone or self._is_there_to_stay(sights[best].place_ned) else None
 
     @staticmethod
-    def _nearest(found: list[Detection], places: list[Floats], expected: Floats | None, gate_m: float) -> int | None:
-        """Who is nearest to where the owner is expected, if near enough; if nobody knows that, to the vehicle."""
-        if expected is None:
-            off_m = [float(np.hypot(*detection.chest_hfrd[:2])) for detection in found]
-        else:
-            off_m = [float(np.hypot(*(place - expected)[:2])) for place in places]
-        best = int(np.argmin(off_m))
+    def _nearest(
+        found: list[Detection], sights: list[Sight], may_be: list[int], expected: Floats | None, gate_m: float
+    ) -> int | None:
+        """Who of some is nearest to where the owner is expected, if near enough; if nobody knows, to the vehicle."""
+        far_m = {k: float(np.hypot(*found[k].chest_hfrd[:2])) for k in may_be}
+        off_m = far_m if expected is None else {k: sights[k].off_m(expected) for k in may_be}
+        best = min(may_be, key=off_m.__getitem__)
         if not found[best].has_depth:
-            gate_m += _COLOUR_GATE * float(np.hypot(*found[best].chest_hfrd[:2]))
+            gate_m += _COLOUR_GATE * far_m[best]
         return best if expected is None or off_m[best] <= gate_m else None
 
     def _expected(self, time_us: int, silence_s: float) -> tuple[Floats | None, float]:
@@ -253,6 +254,10 @@ class Senses:
             self._row = []
         self._row = [*self._row[-(_IN_A_ROW - 1) :], place]
         return len(self._row) >= _IN_A_ROW
+
+
+def _sight(detection: Detection, pose: Pose) -> Sight:
+    return Sight(ned_of(detection.chest_hfrd, pose), detection.has_depth, detection.colours)
 
 
 def ned_of(chest_hfrd: Vector, pose: Pose) -> Floats:

@@ -30,6 +30,7 @@ _LEAVES_M_S = wp.constant(2.0)  # of who does not leave as fast as this: they wo
 _SOON_S = wp.constant(0.8)  # they are given way to as if they had set off so long ago at most
 _BACK_GAIN = wp.constant(5.0)  # [1/s]
 _BACK_MAX_M_S = wp.constant(5.0)
+_ANYTHING_M_S = wp.constant(100.0)
 
 
 @wp.struct
@@ -93,6 +94,8 @@ def closing_max(
     `way` leads to where they would be by now [m]; `own_vel` it has until it answers; how uncertain their velocity is;
     `age_s` ago they were seen; so far above their chest.
     """
+    if over_m >= _OVER_M:
+        return _ANYTHING_M_S
     far_m = wp.max(wp.length(way), 1.0e-3)
     leaving = wp.dot(other_vel, way) / far_m
     sure = wp.max(leaving - vel_std, wp.min(leaving, 0.0))
@@ -125,7 +128,7 @@ def sinking_max(k: KeepOff, over_m: float, then_m: float, age_s: float) -> float
         return wp.max(_OVER_GAIN * (over_m - _OVER_M), -k.escape_climb)
     if then_m < _HIGH_WITHIN_M and age_s > _LATE_S:
         return wp.max(_OVER_GAIN * (over_m - _HIGH_M), -_RISE_M_S)
-    return 100.0
+    return _ANYTHING_M_S
 
 
 @wp.struct

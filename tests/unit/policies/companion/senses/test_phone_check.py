@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from policies.companion.senses.phone_check import PhoneCheck, PhoneFit, Word
+from policies.companion.senses.phone_check import PhoneCheck, PhoneFit, Suitor, Word
 from policies.companion.senses.seen_owner import PersonNow
 
 OFF = np.array([1.5, -1.0])  # [m] the phone's slow error
@@ -56,7 +56,7 @@ class Talk:
         phone = who.pos_ned[:2] + self.noise * OFF + self.rng.normal(0.0, 0.3 * self.noise, 2)
         vel = who.vel + self.rng.normal(0.0, 0.2 * self.noise, 2)
         known = [
-            (person(walk, self.t, self.rng), self.fits.setdefault(walk, PhoneFit()))
+            Suitor(person(walk, self.t, self.rng), self.fits.setdefault(walk, PhoneFit()))
             for walk in (owner, *others)
             if walk
         ]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from policies.companion.senses.poses import Pose
-from policies.companion.senses.seen_owner import SeenOwner
+from policies.companion.senses.seen_owner import SeenOwner, Sight
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 
@@ -18,7 +18,7 @@ def walked(vel: tuple[float, float], count: int, std_m: float = 0.0) -> SeenOwne
     for k in range(1, count + 1):
         place = np.array([2.0 + 0.1 * k * vel[0], 0.1 * k * vel[1], -1.0])
         place[:2] += std_m * rng.normal(size=2)
-        owner.see(place, pose(k), has_depth=True)
+        owner.see(Sight(place, has_depth=True), pose(k))
     return owner
 
 
@@ -41,7 +41,7 @@ def test_noise_is_filtered() -> None:
 def test_who_stops_is_noticed_sooner_than_noise_would_be() -> None:
     owner = walked((3.0, 0.0), 40)
     for k in range(41, 46):
-        owner.see(np.array([2.0 + 12.0, 0.0, -1.0]), pose(k), has_depth=True)
+        owner.see(Sight(np.array([2.0 + 12.0, 0.0, -1.0]), has_depth=True), pose(k))
     assert owner.now(4_500_000)[1][0] < 1.0
 
 
@@ -55,7 +55,7 @@ def test_who_has_not_been_seen_for_long_is_believed_to_slow_down() -> None:
 
 def test_who_comes_back_after_long_is_somebody_new() -> None:
     owner = walked((2.0, 0.0), 40)
-    owner.see(np.array([0.0, 5.0, -1.0]), pose(100), has_depth=True)
+    owner.see(Sight(np.array([0.0, 5.0, -1.0]), has_depth=True), pose(100))
     place, vel = owner.now(10_000_000)
     assert place == pytest.approx([0.0, 5.0, -1.0])
     assert vel == pytest.approx([0.0, 0.0])
@@ -64,10 +64,10 @@ def test_who_comes_back_after_long_is_somebody_new() -> None:
 def test_a_range_by_colours_alone_counts_less_than_its_direction() -> None:
     owner = SeenOwner()
     for k in range(1, 20):
-        owner.see(np.array([2.0, 0.0, -1.0]), pose(k), has_depth=True)
-    owner.see(np.array([2.6, 0.0, -1.0]), pose(20), has_depth=False)
+        owner.see(Sight(np.array([2.0, 0.0, -1.0]), has_depth=True), pose(k))
+    owner.see(Sight(np.array([2.6, 0.0, -1.0]), has_depth=False), pose(20))
     along = owner.now(2_000_000)[0][0] - 2.0
-    owner.see(np.array([2.0, 0.6, -1.0]), pose(21), has_depth=False)
+    owner.see(Sight(np.array([2.0, 0.6, -1.0]), has_depth=False), pose(21))
     aside = owner.now(2_100_000)[0][1]
     assert 0.0 < along < 0.1
     assert aside > 2.0 * along
@@ -80,5 +80,5 @@ def test_wild_sights_do_not_make_it_diverge(seed: int) -> None:
         time_us += int(rng.choice([0, 100_000, 300_000, 2_500_000]))
         place = place + rng.normal(0.0, 0.3, 3)
         eye = place + rng.normal(0.0, rng.choice([0.01, 1.0, 5.0]), 3)
-        owner.see(place, Pose(time_us, tuple(eye), LEVEL), has_depth=bool(rng.random() < 0.6))
+        owner.see(Sight(place, has_depth=bool(rng.random() < 0.6)), Pose(time_us, tuple(eye), LEVEL))
         assert np.abs(owner.now(time_us)[1]).max() < 50.0
