@@ -28,7 +28,8 @@ _SAME_BODY = 0.15  # likewise, of pixels of one body
 _BODY_PX = (8, 4)  # to either side of a chest, where its body is looked for
 _COLOURS_SHORT = 1.12  # by which ranges by colours alone are too short; measured in flights
 _HALF_BODY_M = 0.09  # from the skin to the middle; measured in flights
-_CHEST_M = (0.12, 0.1, 0.3)  # aside, up and down of its middle: all of it is shirt
+_CHEST_M = (0.3, 0.3, 0.4)  # aside, up and down of its middle: nearly all of the body there is shirt
+_COLOURS_WITHIN_M = 6.0  # farther off, too few pixels are of nothing else
 _DARK = 0.2  # of the image's brightness: darker than this, a colour is noise
 WEIGHTS = Path(__file__).parent / "weights.pt"
 _HALF_WIDTH = np.tan(np.radians(0.5 * HFOV_DEG))
@@ -47,7 +48,7 @@ class Detection:
     has_depth: bool = True
     """The range is of depth; else of how large they look."""
     colours: NDArray[np.float64] | None = None
-    """Of their chest: logarithms of red and blue over green, and of brightness over the image's; None: not seen."""
+    """Of their chest: logarithms of red and blue over green, and of brightness over the image's; None: too far off."""
 
 
 class DetectorNetwork(nn.Module):
@@ -183,12 +184,21 @@ def _chest_hfrd(at: tuple[float, float], range_m: float, width: int, down_frd: t
 
 
 def _chest_colours(pixels: NDArray[np.uint8], at: tuple[float, float], range_m: float) -> NDArray[np.float64] | None:
-    """What their chest looks like: of the middle pixel of each colour."""
+    """What their chest looks like: of the middle one of each colour of the pixels there that are as far off."""
+    if range_m > _COLOURS_WITHIN_M:
+        return None
     width = pixels.shape[1]
-    aside, up, down = (max(m * 0.5 * width / (_HALF_WIDTH * range_m), 0.5) for m in _CHEST_M)
+    per_m = 0.5 * width / (_HALF_WIDTH * range_m)
+    aside, up, down = (max(m * per_m, 1.0) for m in _CHEST_M)
     columns = slice(max(round(at[0] - aside), 0), round(at[0] + aside))
     rows = slice(max(round(at[1] - up), 0), round(at[1] + down))
-    chest = pixels[rows, columns, :3].reshape(-1, 3)
+    depth = pixels[rows, columns, 3].astype(np.float64)
+    steps = (np.array(at) - 0.5 * width) * (2.0 * _HALF_WIDTH / width)
+    skin_m = (range_m - _HALF_BODY_M) / sqrt(1.0 + float(steps @ steps))
+    is_body = (depth < _NO_RETURN) & (
+        np.abs(np.log(depth_of(np.minimum(depth, _NO_RETURN - 1.0)) / skin_m)) < _SAME_BODY
+    )
+    chest = pixels[rows, columns, :3][is_body]
     if len(chest) == 0:
         return None
     brightness = float(pixels[..., :3].mean()) + 1.0

@@ -5,15 +5,14 @@ looks otherwise hardly is the same.
 """
 
 from dataclasses import dataclass
-from math import log
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 # Measured in flights: colours of one person about their mean, and of people's means.
-_SCATTER = np.linalg.inv([[0.012, -0.020, 0.0], [-0.020, 0.062, 0.0], [0.0, 0.0, 0.041]])
-_APART = 2.4  # what is gained where there is no difference: people's means are so much farther apart, in logarithms,
+_SCATTER_VAR = np.array([0.014, 0.040, 0.036])
+_APART = 2.2  # what is gained where there is no difference: people's means are so much farther apart, in logarithms,
 _MATCHES = 1.6  # and at most: one of five others may wear the same
 _DIFFERS = -4.0  # what is lost at most: light may have changed
 _SLOW = 0.5  # of the scatter is of light, which changes slowly
@@ -43,4 +42,4 @@ def likeness(one: Looks, other: Looks) -> float:
         return 0.0
     off = one.mean - other.mean
     scatter = _SLOW + (1.0 - _SLOW) * (1.0 / one.images + 1.0 / other.images)
-    return float(np.clip(_APART - 0.5 * float(off @ _SCATTER @ off) / scatter, _DIFFERS, _MATCHES))
+    return float(np.clip(_APART - 0.5 * float((off * off / _SCATTER_VAR).sum()) / scatter, _DIFFERS, _MATCHES))

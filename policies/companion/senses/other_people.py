@@ -53,7 +53,12 @@ class OtherPeople:
         """When one of them was seen last who walked: a trunk that the detector takes for somebody does not."""
 
     def left(
-        self, sights: list[Sight], owner: Floats | None, likeness_of: list[float], pose: Pose, gone_us: int | None = None
+        self,
+        sights: list[Sight],
+        owner: Floats | None,
+        likeness_of: list[float],
+        pose: Pose,
+        gone_us: int | None = None,
     ) -> list[int]:
         """Indices of the sights that are of nobody whom it knows, the owner's among them; the others are taken in.
 

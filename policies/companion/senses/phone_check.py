@@ -30,7 +30,9 @@ _ANY_VEL_VAR = 1.0  # [m²/s²] each axis: how somebody who is not seen may go b
 _PLACE, _PLACE_ALONE = 1.5, 3.5  # likelihood that a place which fits gains, with a velocity and without
 _SURE = 3.0  # log likelihood ratio that counts,
 _SURE_ALONE = 9.0  # and where nobody else was seen
-_FITS = 3.0  # from which an unknown one is the owner
+_FITS = 3.0  # from which an unknown one is the owner,
+_PATIENT_S, _FITS_LATER = 2.0, 0.5  # less by so much a second later: they are looked for where the phone says;
+_FITS_LEAST = 2.0
 _MOST = 10.0  # either way: somebody may be taken for another at any time;
 _LEAST = 4.0  # and against somebody else: they may turn out to be the owner soon
 _HEARD = 2  # after so many reports
@@ -184,6 +186,7 @@ class PhoneCheck:
 
     def __init__(self) -> None:
         self._usual = Usual()
+        self._alone_s = 0.0  # without an owner
 
     def owner(self, phone: Floats) -> Floats | None:
         """Where a report puts the owner, level [m]; None: its error is not known yet."""
@@ -206,6 +209,7 @@ class PhoneCheck:
         swapped = None if owner is None else self._swapped(owner, others)
         if swapped is not None:
             return Word.ANOTHER, swapped
+        self._alone_s = 0.0 if owner is not None else self._alone_s + since_s
         last = (None, None) if owner is None else (owner.fit.apart, owner.fit.apart_vel)
         for who in [*others, *([owner] if owner is not None else [])]:
             who.fit.hear(phone, phone_vel, who.now, since_s, self._usual)
@@ -219,7 +223,8 @@ class PhoneCheck:
         best = max(range(len(others)), key=odds.__getitem__, default=-1)
         is_heard = best >= 0 and others[best].fit.reports >= _HEARD
         if owner is None:
-            if not (has_met_others and is_heard and odds[best] > _FITS):
+            enough = max(_FITS - _FITS_LATER * max(self._alone_s - _PATIENT_S, 0.0), _FITS_LEAST)
+            if not (has_met_others and is_heard and odds[best] > enough):
                 return Word.AGREES, -1
             self._usual.doubt(others[best])
             return Word.ANOTHER, best
