@@ -115,7 +115,7 @@ def _recipe(folder: Path, trainer: str, hyperparameters: dict[str, Any], steps: 
 
 
 def _forecast(folder: Path, jobs: int) -> dict[str, Any]:
-    """What each policy is said to return before it has flown, by fitted Q evaluation on the logs."""
+    """What each policy is said to return before it has flown, by doubly robust and fitted Q estimates on the logs."""
     from bench.offline_story.forecast import forecast
 
     path = folder / "forecast.json"

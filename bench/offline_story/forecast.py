@@ -11,23 +11,37 @@ from typing import Any
 import torch
 
 from policies.learn.export.policy_file import load_policy
-from policies.offline.fitted_q import FittedQ
+from policies.offline.evaluation.judge import Judge, JudgeSettings
 from policies.offline.store import open_store
 
 GAMMA, STEPS = 0.99, 5000
 
 
 def forecast(datasets: Sequence[Path], policies: Mapping[str, Path], jobs: int) -> dict[str, Any]:
-    """Discounted returns by fitted Q evaluation on all datasets together, and the mean reward that each holds."""
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        estimates = dict(zip(policies, pool.map(partial(_estimate, list(datasets)), policies.values()), strict=True))
+    """Discounted returns by doubly robust and fitted Q estimates on all datasets together, and what each holds.
+
+    Args:
+        datasets: one of each pilot.
+        policies: files, by name.
+        jobs: processes at a time.
+    """
     stores = {path.name: open_store([str(path)]) for path in datasets}
+    pilots = [store.episode_count for store in stores.values()]
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        verdicts = pool.map(partial(_judged, list(datasets), pilots), policies.values())
+        estimates = dict(zip(policies, verdicts, strict=True))
     logged = {name: store.statistics().reward_mean for name, store in stores.items()}
     return {"gamma": GAMMA, "decisions": sum(map(len, stores.values())), "policies": estimates, "logged": logged}
 
 
-def _estimate(datasets: Sequence[Path], policy: Path) -> dict[str, float]:
+def _judged(datasets: Sequence[Path], pilots: Sequence[int], policy: Path) -> dict[str, Any]:
     torch.set_num_threads(1)
-    fitted = FittedQ(open_store([str(path) for path in datasets]), load_policy(policy)[0], GAMMA)
-    fitted.fit(STEPS)
-    return asdict(fitted.estimate())
+    judge = Judge(open_store([str(path) for path in datasets]), JudgeSettings(GAMMA, steps=STEPS), pilots)
+    verdict = judge.judge(load_policy(policy)[0])
+    return {
+        "robust": asdict(verdict.robust),
+        "fitted_q": asdict(verdict.fitted_q),
+        "importance": asdict(verdict.importance),
+        "effective_episodes": verdict.effective_episodes,
+        "outside": verdict.outside_fraction,
+    }

@@ -29,14 +29,17 @@ def write_page(
         f"Logged: {sizes['clumsy']} flights of the mediocre pilot and {sizes['shipped']} of the follower that ships, "
         f"{sizes['seconds']:.0f} s each, {forecast['decisions']:,} decisions; {sizes['steps']:,} gradient steps each.",
         "",
-        "| learnt by | forecast from the logs | 95 % | off the recorded actions | walk, batch | run, batch |",
+        "| learnt by | forecast from the logs: doubly robust | fitted Q | outside of the data | walk, batch | run, batch |",
         "|---|---|---|---|---|---|",
     ]
-    for name, found in sorted(forecast["policies"].items(), key=lambda item: -item[1]["mean"]):
+    for name, found in sorted(forecast["policies"].items(), key=lambda item: -item[1]["robust"]["value"]):
         mark = " (flown)" if name == chosen else ""
-        interval = f"{found['low']:.2f} to {found['high']:.2f}"
+        estimates = " | ".join(
+            f"{found[kind]['value']:.1f} ({found[kind]['low']:.1f} to {found[kind]['high']:.1f})"
+            for kind in ("robust", "fitted_q")
+        )
         bands = " | ".join(f"{100 * validated[name][pace]['in_band'][0]:.1f} %" for pace in ("walk", "run"))
-        lines.append(f"| {name}{mark} | {found['mean']:.2f} | {interval} | {found['away']:.3f} | {bands} |")
+        lines.append(f"| {name}{mark} | {estimates} | {100 * found['outside']:.0f} % | {bands} |")
     lines += [
         "",
         "| flown over MAVLink | condition | flights | within 1 to 3 m | no collision |",

@@ -107,13 +107,17 @@ class Guard:
         s = self.settings
         if age_s > s.image_stop_s:
             return Stance.BLIND
-        among = self.senses.is_heard and self.senses.has_met_others
-        search_s = s.search_among_s if among else s.search_s
+        search_s = s.search_among_s if self._is_among_others else s.search_s
         if silence_s > search_s or (self.stance is Stance.SEARCH and silence_s > s.slow_s):
             return Stance.SEARCH
         if silence_s > s.stop_s:
             return Stance.STOP
         return Stance.SLOW if silence_s > s.slow_s or age_s > s.image_slow_s else Stance.FREE
+
+    @property
+    def _is_among_others(self) -> bool:
+        """Whom it has lost is likely behind somebody, and the phone says where."""
+        return self.senses.is_heard and self.senses.has_met_others
 
     def _searched(self, own: Own, is_searching: bool) -> tuple[Floats, float, float]:
         """Up, out of people's way; towards the phone, no nearer than a stand-off, and round it; without one it turns.
@@ -131,9 +135,10 @@ class Guard:
             if not is_searching or far_m < 0.1:
                 self._there_us = own.boot_us
                 return np.zeros(2), down, yaw_rate
-            speed = min(stopping_speed(far_m - s.search_stand_off_m, s.reaction_s, 1.0), s.search_speed)
+            stand_off_m = s.search_among_m if self._is_among_others else s.search_stand_off_m
+            speed = min(stopping_speed(far_m - stand_off_m, s.reaction_s, 1.0), s.search_speed)
             level = speed * way / far_m
-            if far_m > s.search_stand_off_m + _THERE_M:
+            if far_m > stand_off_m + _THERE_M:
                 self._there_us = own.boot_us
             phase_s = max(own.boot_us - self._there_us, 0) * 1e-6 % _SEARCH_PERIOD_S
             if phase_s < _SEARCH_FACES_S:

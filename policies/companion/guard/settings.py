@@ -31,7 +31,9 @@ class GuardSettings(BaseModel):
     search_speed: float = Field(default=4.0, gt=0.0)
     """[m/s] towards the phone."""
     search_stand_off_m: float = Field(default=5.0, gt=0.0)
-    """It comes no nearer to where the phone says."""
+    """It comes no nearer to where the phone says ..."""
+    search_among_m: float = Field(default=3.0, gt=0.0)
+    """... and than this where others were met: from farther away clothes cannot be told apart."""
     search_round_speed: float = Field(default=1.5, ge=0.0)
     """[m/s] round it, where nobody is seen there."""
     search_height_m: float = Field(default=2.9, gt=0.0)
