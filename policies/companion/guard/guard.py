@@ -26,9 +26,9 @@ from policies.tasks.follow_me.tracked.owner_filter import std_along
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
 _YAW_MAX = 1.5  # [rad/s]
-_SEARCH_PERIOD_S = 36.0  # of a search towards the phone: at first it looks there,
+_SEARCH_PERIOD_S = 24.0  # of a search towards the phone: at first it looks there,
 _SEARCH_FACES_S = 4.0  # then there from other sides, since trees may hide who is there,
-_SEARCH_ROUNDS_S = 25.0  # and then round itself
+_SEARCH_ROUNDS_S = 13.0  # and then round itself
 _THERE_M = 2.0  # so near the stand-off it looks round
 _RISEN_US = 2_000_000  # for so long it stays over the owner
 _SILENCE_MAX_S = 60.0  # silence that is no number is so long

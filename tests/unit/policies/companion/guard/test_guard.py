@@ -136,7 +136,7 @@ def test_a_search_looks_then_goes_round_then_turns_wherever_it_came_from(scene: 
     guard.begin(own)
     far = searched(guard, own, 20.0, 17.0)
     assert max(abs(east) for _, east, _ in far) < 0.1
-    near = searched(guard, own, 5.0, 36.0)
+    near = searched(guard, own, 5.0, 24.0)
     rounds = [k for k, (_, east, _) in enumerate(near) if abs(east) > 0.3]
     turns = [k for k, (*_, yaw_rate) in enumerate(near) if yaw_rate > 0.5]
     assert 35 <= min(rounds) < max(rounds) < min(turns)
