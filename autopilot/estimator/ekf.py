@@ -141,7 +141,8 @@ def horizon_step(ekf: Ekf, i: int, params: EstimatorParams) -> None:
         take_rest(ekf, i, lenient, now_us)
     if ekf.rows[i].stillness.still_s == 0.0:
         ekf.yaw[i].has_moved = 1
-    if ekf.rows[i].nominal.reset_count != resets_before:
+    has_jumped = wp.length(ekf.rows[i].nominal.pos_jump_ned) > 0.0  # by the first fix, too, which is no reset
+    if ekf.rows[i].nominal.reset_count != resets_before or has_jumped:
         ekf.rows[i].output = jump_output(ekf.rows[i].output, ekf.rows[i].nominal)
         ekf.rows[i].estimate = with_jump(ekf.rows[i].estimate, ekf.rows[i].nominal)
     ekf.rows[i].output = correct_output(

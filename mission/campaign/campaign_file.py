@@ -9,6 +9,7 @@ from common.config.yaml_locations import ConfigError, Located, location_at, note
 from mission.campaign.campaign import SEED_KEY, SEED_MAX, Campaign
 from mission.campaign.varying import KeyFault, varied
 from mission.console.option_checks import UserError
+from mission.scenario.parts.checks import Check
 from mission.scenario.scenario import Scenario
 from mission.scenario.scenario_file import read_scenario, scenario_of
 
@@ -32,6 +33,7 @@ def read_campaign(path: Path | str) -> Campaign:
         root.put("name", path.name.removesuffix(SUFFIX).removesuffix(path.suffix))
     campaign = _validated(root)
     scenario = _scenario(root, path)
+    _check_margin(campaign, scenario, root)
     _check_keys(campaign, scenario, root)
     return campaign.model_copy(update={"scenario": scenario})
 
@@ -56,6 +58,19 @@ def _scenario(root: Located, path: Path) -> Scenario:
     if not file.is_file():
         raise UserError(note_at(root.location_of("scenario"), "scenario", f"{given}: no such file"))
     return read_scenario(file)
+
+
+def _check_margin(campaign: Campaign, scenario: Scenario, root: Located) -> None:
+    """Refuses a margin that is of no check of the scenario."""
+    titles = list(dict.fromkeys(_title(check) for check in scenario.checks))
+    if campaign.margin and campaign.margin not in titles:
+        wrong = f"no check is called '{campaign.margin}'; there are {', '.join(titles) or 'none'}"
+        raise UserError(note_at(root.location_of("margin"), "margin", wrong))
+
+
+def _title(check: Check) -> str:
+    """What the results of a check begin with."""
+    return check.name or check.name_chosen.replace("_", " ")
 
 
 def _check_keys(campaign: Campaign, scenario: Scenario, root: Located) -> None:

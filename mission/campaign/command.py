@@ -67,6 +67,7 @@ def fly_campaign_file(
                 campaign,
                 folder or Path("campaigns") / campaign.name,
                 lambda: _workers(campaign, count, run_max, ray, is_batch=batch),
+                lambda logs: _loggers(campaign, count, run_max, logs),
                 must_exist=resume,
             )
     except UserError as error:
@@ -82,3 +83,9 @@ def _workers(campaign: "Campaign", jobs: int, run_max_s: float, ray: str | None,
     from mission.campaign.workers.processes import Processes
 
     return Processes(campaign, jobs, run_max_s, BATCH if is_batch else 1)
+
+
+def _loggers(campaign: "Campaign", jobs: int, run_max_s: float, logs: Path) -> "Workers":
+    from mission.campaign.workers.processes import Processes
+
+    return Processes(campaign, jobs, run_max_s, logs=logs)

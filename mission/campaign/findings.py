@@ -12,6 +12,7 @@ from mission.campaign.runs import Record
 from mission.campaign.statistics import Fraction, Sensitivity, sensitivities, success_of, worst_first
 from mission.campaign.varying import KeyFault, varied
 from mission.scenario.keeping import keep_scenario
+from mission.scenario.runner import RESULT_FILE
 
 WORST_COUNT = 10
 SUMMARY_FILE, WORST_FOLDER = "summary.json", "worst"
@@ -67,7 +68,7 @@ def findings_of(campaign: Campaign, samples: list[Record], searches: list[Any], 
     for search in searches:
         every |= {record.key: record for record in getattr(search, "records", ())}
     worst = worst_first(list(every.values()))[:WORST_COUNT]
-    shutil.rmtree(folder / WORST_FOLDER, ignore_errors=True)  # of an earlier end, with fewer runs
+    _drop_others(folder / WORST_FOLDER, worst)
     return Findings(
         campaign,
         tuple(samples),
@@ -78,9 +79,22 @@ def findings_of(campaign: Campaign, samples: list[Record], searches: list[Any], 
     )
 
 
+def _drop_others(folder: Path, worst: list[Record]) -> None:
+    """Takes away what an earlier end has left: runs that are no longer among the worst, and those without all logs."""
+    names = {record.order.folder for record in worst}
+    for own in folder.glob("*"):
+        if own.name not in names or not has_logs(own):
+            shutil.rmtree(own, ignore_errors=True)
+
+
+def has_logs(own: Path) -> bool:
+    """Whether a run was flown again with its logs to its end, where its result is written."""
+    return (own / RESULT_FILE).is_file()
+
+
 def _kept(campaign: Campaign, record: Record, folder: Path) -> str:
     scenario = campaign.flown
-    own = folder / WORST_FOLDER / f"{record.phase}-{record.number}"
+    own = folder / WORST_FOLDER / record.order.folder
     try:
         exact = varied(scenario, record.values)
     except KeyFault:

@@ -1,5 +1,6 @@
 """One run of a campaign: what is flown, and what came of it. Plain values, written as JSON. Light to import."""
 
+import re
 from dataclasses import asdict, dataclass, field
 from math import inf, isfinite
 from typing import Any
@@ -8,6 +9,7 @@ from mission.campaign.distributions import Value
 from mission.scenario.result import ScenarioResult
 
 SAMPLE = "sample"
+_VEHICLE = re.compile(r"^vehicle \d+: ")  # before the name of a result, where there are several vehicles
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +30,11 @@ class Order:
     @property
     def key(self) -> tuple[str, int]:
         return self.phase, self.number
+
+    @property
+    def folder(self) -> str:
+        """What its folder is called if it is kept."""
+        return f"{self.phase}-{self.number}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,13 +104,13 @@ def record_of(order: Order, result: ScenarioResult, margin_check: str) -> Record
     Args:
         order: what was flown.
         result: what came of it.
-        margin_check: whose margin counts; "": the least of all.
+        margin_check: whose least margin counts, of all its bounds and vehicles; "": the least of all checks.
     """
     margins: dict[str, float] = {}
     for check in result.checks:
         if isfinite(check.margin):
             margins[check.name] = min(check.margin, margins.get(check.name, inf))
-    asked = {name: each for name, each in margins.items() if not margin_check or name == margin_check}
+    asked = {name: each for name, each in margins.items() if not margin_check or _is_of(name, margin_check)}
     least = min(asked, key=lambda name: asked[name], default="")
     units = {check.name: check.unit for check in result.checks}
     verdicts: dict[str, bool] = {}
@@ -115,3 +122,8 @@ def record_of(order: Order, result: ScenarioResult, margin_check: str) -> Record
         failures=tuple(result.failures), verdicts=verdicts, margins=margins,
         simulated_s=result.simulated_s, cpu_s=result.cpu_s,
     )  # fmt: skip
+
+
+def _is_of(result: str, check: str) -> bool:
+    """Whether a result is of a check: a check with several bounds has one for each, and one for each vehicle."""
+    return any(name == check or name.startswith(f"{check}: ") for name in (result, _VEHICLE.sub("", result)))

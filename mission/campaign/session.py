@@ -1,5 +1,6 @@
 """`honeyguide campaign`: flies a campaign, shows how far it is and what it has found, and writes it."""
 
+import shlex
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,14 +12,22 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from mission.campaign.campaign import Campaign
-from mission.campaign.findings import SUMMARY_FILE, Findings, findings_of, fraction_text, write_summary
+from mission.campaign.findings import (
+    SUMMARY_FILE,
+    WORST_FOLDER,
+    Findings,
+    findings_of,
+    fraction_text,
+    has_logs,
+    write_summary,
+)
 from mission.campaign.flying import Flights, Note, Stopped, Workers
 from mission.campaign.report.page import REPORT_FILE, write_report
 from mission.campaign.run_store import RunStore
 from mission.campaign.runs import Record
 from mission.campaign.search.whole import fly_campaign
 from mission.console.option_checks import UserError
-from mission.console.terminal import print_line
+from mission.console.terminal import busy, print_line
 
 WIDTH = 150  # where there is no terminal
 LINE_EVERY = 100  # runs, where there is no terminal
@@ -31,9 +40,21 @@ def identity_of(campaign: Campaign) -> dict[str, Any]:
 
 
 def campaign_session(
-    campaign: Campaign, folder: Path, make_workers: Callable[[], Workers], *, must_exist: bool = False
+    campaign: Campaign,
+    folder: Path,
+    make_workers: Callable[[], Workers],
+    make_loggers: Callable[[Path], Workers],
+    *,
+    must_exist: bool = False,
 ) -> int:
     """Flies, shows and writes it; 0: done and what is required is met, 1: not.
+
+    Args:
+        campaign: with its scenario read.
+        folder: where runs and report go.
+        make_workers: who flies it.
+        make_loggers: who flies the worst runs again, each with its logs in a folder of the folder that is given.
+        must_exist: refuses a folder that holds no campaign.
 
     Raises:
         UserError: the folder cannot be used.
@@ -62,8 +83,29 @@ def campaign_session(
         findings = findings_of(campaign, samples, searches, folder)
         write_summary(findings, folder)
         write_report(findings, folder)
+        try:
+            _log_worst(findings, folder / WORST_FOLDER, make_loggers, console)
+        except KeyboardInterrupt:
+            print_line(console, "stopped by the user; some of the worst runs have no logs, the same command goes on")
+            return 1
     _tell(findings, folder, console)
     return 0 if findings.is_met else 1
+
+
+def _log_worst(findings: Findings, worst: Path, make_loggers: Callable[[Path], Workers], console: Console) -> None:
+    """Flies the worst runs again with their logs; one whose process ended or hung would only do so again."""
+    orders = [each.record.order for each in findings.worst if each.command and not each.record.is_lost]
+    missing = [order for order in orders if not has_logs(worst / order.folder)]
+    if not missing:
+        return
+    loggers = make_loggers(worst)
+    try:
+        with busy(console, f"flying the {len(missing)} worst again for their logs"):
+            for record in loggers.fly(missing):
+                if record.is_lost:
+                    print_line(console, f"{record.phase} {record.number} has no logs: {record.error}")
+    finally:
+        loggers.close()
 
 
 @contextmanager
@@ -109,6 +151,8 @@ def _tell(findings: Findings, folder: Path, console: Console) -> None:
         for each in findings.worst[:3]:
             if each.command:
                 print_line(console, f"again: {each.command}")
+        if any(has_logs(folder / WORST_FOLDER / each.record.order.folder) for each in findings.worst):
+            print_line(console, f"their logs: honeyguide review {shlex.quote(str(folder))}")
     print_line(console, f"report: {folder / REPORT_FILE}; figures: {folder / SUMMARY_FILE}")
 
 

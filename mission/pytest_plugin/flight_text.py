@@ -1,6 +1,7 @@
 """A flight that failed, as a report shows it: what was asked, what happened and when, what was heard, how to see it."""
 
 import shlex
+from collections.abc import Sequence
 from math import isfinite
 
 from mission.scenario.result import CheckResult, ScenarioResult
@@ -20,7 +21,8 @@ def flight_text(result: ScenarioResult, title: str, again: str) -> str:
     if result.error:
         lines.append(f"ended at {result.simulated_s:.1f} s: {result.error.splitlines()[0]}")
     lines += [_check_line(check) for check in result.checks]
-    lines += _heard(result)
+    lines += _listed("what was done to it:", result.events)
+    lines += _listed("heard last:", result.texts[-TEXTS_MAX:])
     lines.append(f"again: {again}")
     if result.folder:
         lines.append(f"kept in {result.folder}; see it: honeyguide replay {shlex.quote(result.folder)}")
@@ -32,10 +34,10 @@ def _check_line(check: CheckResult) -> str:
     return f"{'ok    ' if check.passed else 'FAILED'} {check.name}: asked {check.asked}; {check.happened}{margin}"
 
 
-def _heard(result: ScenarioResult) -> list[str]:
-    """The last texts."""
-    several = len({number for _, number, _ in result.texts}) > 1
-    last = result.texts[-TEXTS_MAX:]
-    return ["heard last:"] * bool(last) + [
-        f"  {time_s:7.1f} s  {f'vehicle {number}: ' if several else ''}{text}" for time_s, number, text in last
+def _listed(title: str, events: Sequence[tuple[float, int, str]]) -> list[str]:
+    """What happened to or was said by vehicles, a line each."""
+    several = len({number for _, number, _ in events} - {0}) > 1
+    return [title] * bool(events) + [
+        f"  {time_s:7.1f} s  {f'vehicle {number}: ' if several and number else ''}{text}"
+        for time_s, number, text in events
     ]

@@ -1,6 +1,7 @@
 """The checks of a scenario that the run's folder holds: what passed, by how much, and when it was worst.
 
-In: `result.json` beside the log, read leniently: what is not there, or is of another form, is left out.
+In: `result.json` beside the log, read leniently: what is not there, or is of another form, is left out. What is wrong
+with the file as a whole is said in a sentence.
 """
 
 import json
@@ -8,6 +9,8 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from typing import Any
+
+from common.config.refusal import shown
 
 RESULT_FILE = "result.json"
 SUMMARY_FILE = "summary.json"
@@ -35,6 +38,34 @@ def checks_of(folder: Path) -> tuple[Check, ...]:
         return ()
     found = [_check(each) for each in listed[:CHECKS_MAX] if isinstance(each, dict) and each.get("name")]
     return tuple(sorted(found, key=_rank))
+
+
+def result_fault(folder: Path) -> str:
+    """What is wrong with the result of a run's folder, in a sentence with its file; "": nothing, or there is none."""
+    path = folder / RESULT_FILE
+    if not path.exists():
+        return ""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        wrong = f"cannot be read: {error.strerror or error}"
+    except UnicodeDecodeError:
+        wrong = "is not UTF-8 text"
+    except json.JSONDecodeError as error:
+        wrong = f"is no JSON: line {error.lineno}: {error.msg[:1].lower()}{error.msg[1:]}"
+    except RecursionError:
+        wrong = "is nested too deeply"
+    else:
+        wrong = _wrong_form(found)
+    return f"{path}: {wrong}: no checks are shown" if wrong else ""
+
+
+def _wrong_form(result: object) -> str:
+    if not isinstance(result, dict):
+        return f"must be a mapping, not {shown(result)}"
+    if not isinstance(result.get("checks", []), list):
+        return f"checks: must be a list, not {shown(result['checks'])}"
+    return ""
 
 
 def result_of(folder: Path) -> str:

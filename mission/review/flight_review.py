@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from common.geodesy import GeoPoint
-from mission.review.check_margins import Check, checks_of, result_of
+from mission.review.check_margins import Check, checks_of, result_fault, result_of
 from mission.review.curves import Section
 from mission.review.logged_flight import LoggedFlight, read_flight
 from mission.review.panels import actuators, estimator, motion, sensors
@@ -58,6 +58,8 @@ class FlightReview:
     changed_parameters: tuple[tuple[str, float, float], ...]
     checks: tuple[Check, ...]
     result: str
+    result_fault: str
+    """What is wrong with the file of its result, in a sentence; "": nothing."""
 
     @property
     def distance_m(self) -> float:
@@ -97,4 +99,5 @@ def _judged(flight: LoggedFlight, folder: Path | None, origin: GeoPoint | None) 
         changed_parameters=tuple(changed_parameters(flight)),
         checks=() if folder is None else checks_of(folder),
         result="" if folder is None else result_of(folder),
+        result_fault="" if folder is None else result_fault(folder),
     )

@@ -1,5 +1,6 @@
 """What a path holds that can be reviewed: a log, the run that wrote it, or a folder of runs."""
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,6 +8,7 @@ from mission.review.logged_flight import ReviewError
 
 SUFFIX = ".ulg"
 DEPTH_MAX, FLIGHTS_MAX = 6, 1000
+CAMPAIGN_FILE, SCENARIO_SUFFIX = "campaign.json", ".scenario.yaml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +29,23 @@ def found_logs(path: Path) -> list[FoundLog]:
     if path.is_dir():
         found = _in_folder(path, path.resolve().name, 0)
         if not found:
-            raise ReviewError(f"{path}: holds no log: there is no {SUFFIX} file in it")
+            raise ReviewError(f"{path}: holds no log: {_why_none(path)}")
         return found[:FLIGHTS_MAX]
     if not path.exists():
         raise ReviewError(f"{path}: there is no such log or folder")
     run = path.parent if path.name == "flight.ulg" else None
     return [FoundLog((path,), path.stem if run is None else run.resolve().name, run)]
+
+
+def _why_none(folder: Path) -> str:
+    if (folder / CAMPAIGN_FILE).is_file():
+        return "the campaign has kept none of its worst runs; the same honeyguide campaign command flies them for it"
+    scenario = next(iter(sorted(folder.glob(f"*{SCENARIO_SUFFIX}"))), None)
+    if scenario is not None:
+        return (
+            f"it is a run's scenario; honeyguide test {shlex.quote(str(scenario))} --keep FOLDER keeps one that fails"
+        )
+    return f"there is no {SUFFIX} file in it"
 
 
 def _in_folder(folder: Path, name: str, depth: int) -> list[FoundLog]:

@@ -58,6 +58,7 @@ def _review_one(found: Sequence[FoundLog], options: ReviewOptions, console: Cons
         with busy(console, f"reading {log.parts[0]}"):
             first = reviews[0].track if reviews else None
             reviews.append(review_flight(log.parts, log.name, log.folder, first.origin if first else None))
+    _tell_faults(reviews, console)
     with busy(console, "drawing"):
         _write(target, review_page(reviews, " and ".join(log.name for log in found)))
     return target
@@ -82,6 +83,7 @@ def _review_many(folder: Path, found: Sequence[FoundLog], output: Path | None, c
             except ReviewError as error:
                 rows.append(unreadable_row(log.name, str(error)))
                 continue
+            _tell_faults([reviewed], console)
             _write(page, review_page([reviewed], log.name))
             start = output if output is not None else folder
             rows.append(index_row(reviewed, page.relative_to(start).as_posix()))
@@ -96,6 +98,12 @@ def _page_of(log: FoundLog, number: int, output: Path | None) -> Path:
     if log.folder is not None:
         return log.folder / PAGE
     return log.parts[0].with_name(f"{log.parts[0].stem}-{PAGE}")
+
+
+def _tell_faults(reviews: Sequence[FlightReview], console: Console) -> None:
+    for reviewed in reviews:
+        if reviewed.result_fault:
+            print_line(console, reviewed.result_fault)
 
 
 def _write(target: Path, page: bytes) -> None:

@@ -39,6 +39,8 @@ class ScenarioResult:
     """Processor time of this process that it took; no part of what is equal at each run."""
     texts: tuple[tuple[float, int, str], ...] = ()
     """What the vehicles said: simulated time [s], number of the vehicle from 1, text."""
+    events: tuple[tuple[float, int, str], ...] = ()
+    """What the scenario did, faults and marks: simulated time [s], number of the vehicle (0: of all), in words."""
     folder: str = ""
     """Where its logs are; "": none were written."""
     ulogs: tuple[str, ...] = ()

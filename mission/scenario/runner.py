@@ -147,6 +147,7 @@ class UnderWay:
             simulated_s=simulated_s,
             cpu_s=process_time_s() - self._begun_s,
             texts=tuple(sorted(texts)),
+            events=tuple(run.events),
             folder="" if folder is None else str(folder),
             ulogs=() if folder is None else tuple(str(path) for path in sorted(folder.rglob("flight*.ulg"))),
             tlogs=() if folder is None else tuple(str(path) for path in sorted(folder.rglob("flight.tlog"))),

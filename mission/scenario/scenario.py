@@ -4,16 +4,18 @@ A file `NAME.scenario.yaml` is one of these written down (`scenario_file.py`); P
 flown by `runner.run_scenario`. Light to import.
 """
 
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
 from common.config.refusal import NO_SUCH_KEY, meant_or_known
+from common.config.yaml_locations import Located, location_at, note_at
 from mission.flight_settings import EngineName, Pace
 from mission.scenario.parts.checks import Check
 from mission.scenario.parts.faults import Fault
-from mission.scenario.parts.part import Finite, Part, Place
+from mission.scenario.parts.part import Finite, Key, KeyRefusal, Part, Place
 from mission.scenario.parts.steps import Step
 
 WorldName = Literal["hills", "plain", "airfield", "follow", "forest", "walled-forest", "course", "car-park"]
@@ -148,9 +150,18 @@ class Vehicle(Part):
         return self
 
 
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The file that a scenario was read from. All are equal: scenarios that say the same are."""
+
+    root: Located | None = field(default=None, compare=False)
+    """None: none, Python made it."""
+
+
 class Scenario(Part):
     """One scenario."""
 
+    _source: Source = PrivateAttr(default_factory=Source)
     name: str = ""
     """Left out: the file's."""
     about: str = ""
@@ -184,20 +195,29 @@ class Scenario(Part):
     @model_validator(mode="after")
     def _fits(self) -> Self:
         if self.vehicles and "vehicle" in self.model_fields_set:
-            raise ValueError("vehicle and vehicles: choose one")
+            raise KeyRefusal(("vehicles",), "there is vehicle, too: choose one")
         fleet = self.fleet
         if len(fleet) > VEHICLES_MAX:
-            raise ValueError(f"vehicles: at most {VEHICLES_MAX} in all, not {len(fleet)}")
-        if len(fleet) > 1 and (self.owner is not None or any(vehicle.policy for vehicle in fleet)):
-            raise ValueError("owner and policy: are for a scenario of one vehicle")
-        for fault in self.faults:
-            if fault.vehicle > len(fleet):
-                raise ValueError(f"faults: there is no vehicle {fault.vehicle}")
-        for check in self.checks:
-            if check.vehicle is not None and check.vehicle > len(fleet):
-                raise ValueError(f"checks: there is no vehicle {check.vehicle}")
+            raise KeyRefusal(("vehicles",), f"at most {VEHICLES_MAX} in all, not {len(fleet)}")
+        learned = [("owner",)] * (self.owner is not None) + [
+            (*key, "policy") for key, vehicle in zip(self.fleet_keys, fleet, strict=True) if vehicle.policy
+        ]
+        if len(fleet) > 1 and learned:
+            raise KeyRefusal(learned[0], "is for a scenario of one vehicle")
+        for i, fault in enumerate(self.faults):
+            self._check_number(("faults", i, "vehicle"), fault.vehicle)
+        for i, check in enumerate(self.checks):
+            self._check_number(("checks", i, "vehicle"), check.vehicle)
+            self._check_number(("checks", i, "near", "to_vehicle"), check.near.to_vehicle if check.near else None)
         self._check_marks()
         return self
+
+    def _check_number(self, key: Key, number: int | None) -> None:
+        """Refuses the number of a vehicle that there is not."""
+        count = len(self.fleet)
+        if number is not None and number > count:
+            there = f"there are 1 to {count}" if count > 1 else "there is one vehicle, 1"
+            raise KeyRefusal(key, f"there is no vehicle {number}; {there}")
 
     def _check_marks(self) -> None:
         """Refuses a mark that nothing makes; Python may make any."""
@@ -205,12 +225,11 @@ class Scenario(Part):
             return
         steps = [step for vehicle in self.fleet for step in vehicle.script]
         known = {step.mark.name for step in steps if step.mark} | {fault.mark for fault in self.faults if fault.mark}
-        for number, check in enumerate(self.checks):
-            for end in (check.from_, check.to):
+        for i, check in enumerate(self.checks):
+            for name, end in (("from", check.from_), ("to", check.to)):
                 if isinstance(end, str) and end not in known and not end.startswith(ITEM_MARK):
-                    raise ValueError(
-                        f"checks[{number}]: nothing makes a mark '{end}'; {meant_or_known(end, sorted(known))}"
-                    )
+                    hint = meant_or_known(end, sorted(known))
+                    raise KeyRefusal(("checks", i, name), f"nothing makes a mark '{end}'; {hint}")
 
     @property
     def needs_learn(self) -> bool:
@@ -221,3 +240,26 @@ class Scenario(Part):
     def fleet(self) -> tuple[Vehicle, ...]:
         """Every vehicle, those of a count one by one."""
         return tuple(each for given in self.vehicles or (self.vehicle,) for each in [given] * given.count)
+
+    @property
+    def fleet_keys(self) -> tuple[Key, ...]:
+        """Where each of `fleet` is described."""
+        if not self.vehicles:
+            return (("vehicle",),) * self.vehicle.count
+        return tuple(("vehicles", i) for i, given in enumerate(self.vehicles) for _ in range(given.count))
+
+    def keep_source(self, root: Located) -> None:
+        """Remembers the file that it was read from, for refusals."""
+        self._source = Source(root)
+
+    def refusal(self, refused: KeyRefusal, name: str) -> str:
+        """The sentence about a key, with file and line.
+
+        Args:
+            refused: what is wrong.
+            name: how a scenario is called that was read from no file.
+        """
+        if self._source.root is None:
+            return f"{name}: {refused}"
+        location, key = location_at(self._source.root, refused.key)
+        return note_at(location, key, refused.sentence)

@@ -6,11 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
-from common.config.refusal import NO_SUCH_KEY, faulty_path, keys_beside, sentence
-from common.config.yaml_locations import ConfigError, Located, location_at, parse_yaml
+from common.config.refusal import NO_SUCH_KEY, faulty_path, keys_beside, sentence, unknown_key
+from common.config.yaml_locations import ConfigError, Located, location_at, note_at, parse_yaml
 from mission.console.option_checks import UserError
+from mission.scenario.parts.part import Key, KeyRefusal
 from mission.scenario.scenario import Scenario
+from mission.world.world_reader import without_consequences
 
 SUFFIX = ".scenario.yaml"
 READY = Path(__file__).parent / "ready"
@@ -97,19 +100,36 @@ def scenario_of(root: Located, name: str, folder: Path) -> Scenario:
         root.put("name", name)
     resolve_paths(root, folder.resolve())
     try:
-        return Scenario.model_validate(root)
+        scenario = Scenario.model_validate(root)
     except ValidationError as error:
         raise UserError(_fault(error, root)) from error
+    scenario.keep_source(root)
+    return scenario
 
 
 def _fault(error: ValidationError, root: Located) -> str:
     """The first fault as a sentence with its place."""
-    first = min(error.errors(), key=lambda each: location_at(root, faulty_path(each))[0].line)
-    location, key = location_at(root, faulty_path(first))
-    text = sentence(first, Scenario)
-    if text == NO_SUCH_KEY:
-        text += f"; there are {', '.join(keys_beside(Scenario, first['loc']))}"
-    return f"{location}: {key}: {text}" if key else f"{location}: {text}"
+    first = min(without_consequences(error.errors()), key=lambda each: location_at(root, _key(each))[0].line)
+    location, key = location_at(root, _key(first))
+    return note_at(location, key, _sentence(first))
+
+
+def _key(error: ErrorDetails) -> Key:
+    """The path of what is wrong, which may be deeper than what pydantic was looking at."""
+    raised = error.get("ctx", {}).get("error")
+    return (*faulty_path(error), *(raised.key if isinstance(raised, KeyRefusal) else ()))
+
+
+def _sentence(error: ErrorDetails) -> str:
+    """What is wrong, without the place."""
+    raised = error.get("ctx", {}).get("error")
+    if isinstance(raised, KeyRefusal):
+        return raised.sentence
+    if error["type"] != "extra_forbidden":
+        return sentence(error, Scenario)
+    names = [name.removesuffix("_") for name in keys_beside(Scenario, error["loc"])]  # `from` is a word of Python's
+    text = unknown_key(str(error["loc"][-1]), names)
+    return f"{text}; there are {', '.join(names)}" if text == NO_SUCH_KEY else text
 
 
 def resolve_paths(root: dict[str, Any], folder: Path) -> None:

@@ -176,4 +176,5 @@ def failure_lines(flown: Flown) -> list[str]:
     if result is None:
         return [flown.refusal]
     kept = [f"  kept in {result.folder}; again: {flown.command}"] if flown.command else []
-    return [f"{result.name}, seed {result.seed}:", *(f"  {text}" for text in result.failures), *kept]
+    done = [f"  {time_s:.1f} s {text}" for time_s, _, text in result.events]
+    return [f"{result.name}, seed {result.seed}:", *(f"  {text}" for text in result.failures), *done, *kept]

@@ -1,9 +1,11 @@
 """A world file read: YAML into a `WorldFile`; what is wrong gets one sentence: file, line, key, what is allowed."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from common.config.refusal import sentence
 from common.config.yaml_locations import ConfigError, Located, location_at, note_at, read_yaml
@@ -39,13 +41,19 @@ def read_and_build(file: Path) -> "tuple[WorldFile, WorldMap]":
     except ConfigError as error:
         raise UserError(str(error)) from error
     except ValidationError as error:
-        first = error.errors()[0]
+        first = without_consequences(error.errors())[0]
         said = sentence(first, WorldFile)
         if first["type"] == "extra_forbidden" and said == "unknown key":
             said = f"unknown key; allowed are {', '.join(_keys_at(first['loc']))}"
         raise UserError(_at(root, first["loc"], said)) from error
     except WorldError as error:
         raise UserError(_at(root, error.loc, error.sentence)) from error
+
+
+def without_consequences(errors: Sequence[ErrorDetails]) -> list[ErrorDetails]:
+    """What pydantic found, without the keys that are missing only because they are spelled wrong."""
+    unknown = {each["loc"][:-1] for each in errors if each["type"] == "extra_forbidden"}
+    return [each for each in errors if each["type"] != "missing" or each["loc"][:-1] not in unknown]
 
 
 def _at(root: Located, loc: tuple[int | str, ...], said: str) -> str:

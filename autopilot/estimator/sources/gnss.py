@@ -60,6 +60,9 @@ GNSS_STUCK_MOVED = wp.constant(3.0)  # [m]
 _DOUBTED_HEADING_STD = wp.constant(0.2)  # [rad]
 _DOUBTED_BODY_FRACTION = wp.constant(4.0)  # of the body field's deviation at the start
 _LOST_VAR = wp.constant(1.1e4)  # [m²] beyond 100 m the position is set by a fix: float32 would not subtract well
+_NOWHERE_VAR = wp.constant(25.0)  # [m²] beyond 5 m the first fix sets it: fused, the present would glide there
+    25.0
+)  # [m²] beyond 5 m the first fix sets it: fused, the present would glide there in a second
 _RESET_AFTER_S = wp.constant(5.0)  # nothing passed for so long: believe the receiver rather than the dead reckoning
 
 
@@ -234,7 +237,8 @@ def fuse_gnss_pos(
         starved_s = seconds_since(sample.time_us, aid.fused_time_us)
         aid = judge(aid, sample.time_us, innov, innov_var, 2, params.gnss_pos_gate)
         aid.is_active = 1
-        is_lost = cov[i, POS][POS] > _LOST_VAR
+        is_first = aid.fused_time_us == wp.int64(0)
+        is_lost = cov[i, POS][POS] > wp.where(is_first, _NOWHERE_VAR, _LOST_VAR)
         if aid.test_ratio <= 1.0 and not is_lost:
             for axis in range(2):
                 ph, ph_slow, hph = offset_products(cov, i, POS + axis, axis)
@@ -242,10 +246,13 @@ def fuse_gnss_pos(
                 nominal = fuse(params, cov, i, nominal, ph, ph_slow, axis_innov, hph + var)
             aid = mark_fused(aid)
         elif may_reset and (is_lost or starved_s > _RESET_AFTER_S):
-            nominal.reset_count += 1
             for axis in range(2):
                 nominal = set_gnss_axis(params, cov, i, nominal, sample, axis, pos_ned[axis], var)
-            aid = mark_reset(aid)
+            if is_first:
+                aid = mark_fused(aid)
+            else:
+                nominal.reset_count += 1
+                aid = mark_reset(aid)
     return nominal, aid
 
 

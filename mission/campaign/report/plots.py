@@ -91,19 +91,19 @@ def margins_plot(findings: Findings) -> Draw | None:
         axes.hist([margins[True], margins[False]], edges.tolist(), stacked=True, color=[PASSED_COLOUR, FAILED_COLOUR],
                   label=[f"passed ({len(margins[True])})", f"failed ({len(margins[False])})"])  # fmt: skip
         axes.axvline(0.0, color=INK, lw=0.8)
-        axes.set(xlabel=margin_label(judged), ylabel="runs")
+        axes.set(xlabel=margin_label(judged, findings.campaign.margin), ylabel="runs")
         _legend(axes)
 
     return draw
 
 
-def margin_label(records: Sequence[Record]) -> str:
+def margin_label(records: Sequence[Record], check: str) -> str:
     """What the margins are of."""
     kinds = {(record.check, record.unit) for record in records if record.margin is not None}
     if len(kinds) == 1:
-        check, unit = next(iter(kinds))
-        return f"margin of {check} [{unit}]" if unit else f"margin of {check}"
-    return "least margin of all checks, each in its unit"
+        name, unit = next(iter(kinds))
+        return f"margin of {name} [{unit}]" if unit else f"margin of {name}"
+    return f"least margin of {check or 'all checks'}, each in its unit"
 
 
 def key_plot(findings: Findings, sensitivity: Sensitivity) -> Draw:

@@ -9,6 +9,7 @@ import signal
 from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from typing import Any
 
 from common.clock import wall_time_s
@@ -19,14 +20,14 @@ LOOK_S = 1.0  # between looks for those that hang
 START_S = 600.0  # a process that compiles kernels on a busy machine is given
 
 
-def _work(campaign: Campaign, chunks: "Connection[list[Record], list[Order]]") -> None:
+def _work(campaign: Campaign, logs: Path | None, chunks: "Connection[list[Record], list[Order]]") -> None:
     """The life of a process: imports what flies, then flies what comes until nothing more does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the campaign ends it
     from mission.campaign.workers.fly_run import fly_chunk
 
     try:
         while True:
-            chunks.send(fly_chunk(campaign, chunks.recv()))
+            chunks.send(fly_chunk(campaign, chunks.recv(), logs))
     except (EOFError, BrokenPipeError, ConnectionResetError):  # the campaign is gone
         return
 
@@ -34,10 +35,10 @@ def _work(campaign: Campaign, chunks: "Connection[list[Record], list[Order]]") -
 class _Worker:
     """One process and the runs that it has."""
 
-    def __init__(self, campaign: Campaign) -> None:
+    def __init__(self, campaign: Campaign, logs: Path | None) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
-        self.process: BaseProcess = context.Process(target=_work, args=(campaign, theirs), daemon=True)
+        self.process: BaseProcess = context.Process(target=_work, args=(campaign, logs, theirs), daemon=True)
         self.process.start()
         theirs.close()
         self.orders: list[Order] = []
@@ -81,10 +82,14 @@ class Processes:
         jobs: how many at a time.
         run_max_s: a run that takes longer by the wall clock hangs, and is given up.
         batch: how many runs a process flies in a launch of the kernels; 1: each by itself, over MAVLink.
+        logs: where each run has a folder with its logs; None: no run has.
     """
 
-    def __init__(self, campaign: Campaign, jobs: int, run_max_s: float, batch: int = 1) -> None:
+    def __init__(
+        self, campaign: Campaign, jobs: int, run_max_s: float, batch: int = 1, logs: Path | None = None
+    ) -> None:
         self._campaign, self._jobs, self._run_max_s, self._batch = campaign, jobs, run_max_s, batch
+        self._logs = logs
         self._workers: list[_Worker] = []
 
     def fly(self, orders: Sequence[Order]) -> Iterator[Record]:
@@ -92,7 +97,7 @@ class Processes:
         waiting = self._chunks(orders)
         while waiting or any(worker.orders for worker in self._workers):
             while len(self._workers) < min(self._jobs, len(waiting) + sum(bool(w.orders) for w in self._workers)):
-                self._workers.append(_Worker(self._campaign))
+                self._workers.append(_Worker(self._campaign, self._logs))
             for worker in list(self._workers):
                 if waiting and not worker.orders:
                     self._give(worker, waiting)

@@ -7,18 +7,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from autopilot.mavlink.client_end import GROUND_STATION, ClientEnd
 from autopilot.mavlink.transport.links import Link, LinkRole, memory_pair
-from common.airframe import AirframeError, load_airframe
+from common.config.refusal import sentence
 from common.geodesy import DEFAULT_HOME, GeoPoint
-from common.params import ParameterError
 from mission.console.option_checks import UserError
 from mission.fleet.fleet_flight import FleetFlight
 from mission.fleet.fleet_options import Member
 from mission.fleet.roster import fleet_configs
 from mission.flight import Flight
-from mission.flight_config import AIRFIELD, TREELESS_M, FlightConfig, OwnerConfig, flight_parameters
-from mission.plan.plan_file import PlanError, read_plan
+from mission.flight_config import AIRFIELD, TREELESS_M, FlightConfig, OwnerConfig
+from mission.scenario.flight.checking import airframe_of, check_faults, check_orders, check_parameters, check_starts
+from mission.scenario.parts.part import KeyRefusal
 from mission.scenario.scenario import Scenario, Vehicle, World
 from mission.simulator.flight_rig import flight_world
 from mission.world.world_reader import read_world
@@ -68,22 +70,34 @@ def world_config(world: World) -> WorldConfig:
     """The ground as the world module has it.
 
     Raises:
-        UserError: it cannot be made so.
+        KeyRefusal: it cannot be made so.
     """
     if world.file is not None:
-        return read_world(world.file)
+        return _world_of(world.file)
     given = {k: v for k, v in world.model_dump(exclude={"kind", "file"}).items() if v is not None}
     try:
         return WorldConfig(**{**_kind(world.kind).model_dump(), **given})
-    except ValueError as error:
-        raise UserError(f"world: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise KeyRefusal(("world", *first["loc"]), sentence(first, WorldConfig)) from error
+
+
+def _world_of(file: Path) -> WorldConfig:
+    """The world of a file."""
+    key = ("world", "file")
+    if not file.is_file():
+        raise KeyRefusal(key, f"{file}: no such file")
+    try:
+        return read_world(file)
+    except UserError as error:
+        raise KeyRefusal(key, str(error)) from error
 
 
 def flight_configs(scenario: Scenario, seed: int) -> list[FlightConfig]:
     """The configuration of each vehicle, with its parameters checked.
 
     Raises:
-        UserError: an airframe, a parameter or the world is wrong.
+        KeyRefusal: an airframe, a parameter or the world is wrong.
     """
     fleet = scenario.fleet
     home = DEFAULT_HOME if scenario.home is None else GeoPoint(*scenario.home.model_dump().values())
@@ -98,39 +112,37 @@ def flight_configs(scenario: Scenario, seed: int) -> list[FlightConfig]:
         world=world_config(scenario.world),
         owner=None if scenario.owner is None else OwnerConfig(**scenario.owner.model_dump()),
     )
-    try:
-        own = [_own(base, scenario, vehicle) for vehicle in fleet]
-        for config in own:
-            flight_parameters(config, load_airframe(config.airframe))
-        return own if len(own) == 1 else _placed(base, scenario, own)
-    except (AirframeError, ParameterError) as error:
-        raise UserError(str(error)) from error
+    own = []
+    for key, vehicle in zip(scenario.fleet_keys, fleet, strict=True):
+        airframe = airframe_of(vehicle, key)
+        own.append(_own(base, scenario, vehicle, drives=class_of(airframe).drives))
+        check_parameters(own[-1], airframe, key)
+    return own if len(own) == 1 else _placed(base, scenario, own)
 
 
 def check_scenario(scenario: Scenario, file: str) -> None:
     """Refuses what can be seen to be wrong before anything is flown.
 
+    Args:
+        scenario: what is to be flown.
+        file: how refusals call a scenario that was read from no file; others have file and line of the key.
+
     Raises:
-        UserError: an airframe, parameter, plan, policy or function is not there.
+        UserError: an airframe, parameter, plan, policy or function is not there, a fault is of a part that is not
+            there, or a vehicle starts where it cannot.
     """
     try:
-        flight_configs(scenario, scenario.seeds[0])
-        for vehicle in scenario.fleet:
-            for plan in [vehicle.plan, *(step.fly_plan.file for step in vehicle.script if step.fly_plan)]:
-                if plan is not None:
-                    read_plan(plan)
-            if vehicle.python is not None and not Path(vehicle.python.rpartition(":")[0]).is_file():
-                raise UserError(f"{vehicle.python}: no such file")
-            if vehicle.policy is not None:
-                from mission.scenario.flight.companions import check_policy
-
-                check_policy(vehicle.policy)
-    except (UserError, PlanError) as error:
+        configs = flight_configs(scenario, scenario.seeds[0])
+        check_orders(scenario)
+        check_faults(scenario, configs)
+        check_starts(scenario, configs)
+    except KeyRefusal as error:
+        raise UserError(scenario.refusal(error, file)) from error
+    except UserError as error:
         raise UserError(f"{file}: {error}") from error
 
 
-def _own(base: FlightConfig, scenario: Scenario, vehicle: Vehicle) -> FlightConfig:
-    drives = class_of(load_airframe(vehicle.airframe)).drives
+def _own(base: FlightConfig, scenario: Scenario, vehicle: Vehicle, *, drives: bool) -> FlightConfig:
     follows_on_wheels = scenario.owner is not None and drives
     return base.model_copy(
         update={
@@ -150,7 +162,10 @@ def _own(base: FlightConfig, scenario: Scenario, vehicle: Vehicle) -> FlightConf
 def _placed(base: FlightConfig, scenario: Scenario, own: list[FlightConfig]) -> list[FlightConfig]:
     """Side by side where they have no place of their own, each with its number and seed."""
     members = [Member(config.airframe, "own") for config in own]
-    placed = fleet_configs(base, members, flight_world(base))
+    try:
+        placed = fleet_configs(base, members, flight_world(base))
+    except UserError as error:
+        raise KeyRefusal(("vehicles",), str(error).removeprefix("--vehicles: ")) from error
     fleet = []
     for config, mine, vehicle in zip(placed, own, scenario.fleet, strict=True):
         has_place = (

@@ -1,9 +1,13 @@
-"""Makes the faults of a scenario happen, and end: at their time, or when their condition first holds."""
+"""Makes the faults of a scenario happen, and end: at their time, or when their condition first holds.
+
+Of several faults of one thing the one that began last counts; when it ends, the one before does again.
+"""
 
 from collections.abc import Sequence
+from math import inf
 
-from mission.console.option_checks import UserError
 from mission.scenario.flight.building import set_charge
+from mission.scenario.flight.checking import check_faults
 from mission.scenario.flight.quantities import hold_now
 from mission.scenario.flight.run import Run, VehicleRun
 from mission.scenario.parts.conditions import Term, terms_of
@@ -30,9 +34,8 @@ class FaultTimeline:
         self._awaited: list[tuple[Fault, tuple[Term, ...]]] = [
             (fault, terms_of(fault.when)) for fault in faults if fault.when is not None
         ]
-        self._ending: list[tuple[int, Fault]] = []  # [us]
-        for fault in faults:
-            self._check(fault)
+        self._active: list[tuple[Fault, float]] = []  # as they began, and when each ends [us]
+        self._check(faults)
 
     def add(self, fault: Fault) -> None:
         """One more, at its time.
@@ -40,7 +43,7 @@ class FaultTimeline:
         Raises:
             UserError: the part is not there to fail.
         """
-        self._check(fault)
+        self._check([fault])
         self._timed = sorted([*self._timed, fault], key=lambda each: each.at or 0.0)
 
     def frame(self, time_us: int) -> None:
@@ -52,9 +55,8 @@ class FaultTimeline:
             self._awaited = [each for each in self._awaited if each not in due]
             for fault, _ in due:
                 self._begin(fault, time_us)
-        for end in [end for end in self._ending if time_us >= end[0]]:
-            self._ending.remove(end)
-            self._change(end[1], is_on=False)
+        for each in [each for each in self._active if time_us >= each[1]]:
+            self._end(each)
 
     @property
     def left(self) -> list[Fault]:
@@ -65,21 +67,32 @@ class FaultTimeline:
         return self._run.vehicles[fault.vehicle - 1]
 
     def _begin(self, fault: Fault, time_us: int) -> None:
-        self._change(fault, is_on=True)
+        if fault.link is None or not self._same(fault):
+            self._change(fault, is_on=True)
+        self._run.note(f"fault: {fault.in_words}", fault.vehicle)
         if fault.mark:
             self._run.mark(fault.mark)
-        if fault.for_s is not None:
-            self._ending.append((time_us + round(fault.for_s * 1e6), fault))
+        end_us = inf if fault.for_s is None else time_us + fault.for_s * 1e6
+        self._active.append((fault, end_us))
 
-    def _check(self, fault: Fault) -> None:
-        flight = self._vehicle(fault).flight
-        motors = flight.controller.state.motor_count
-        if fault.motor is not None and fault.motor.number > motors:
-            raise UserError(f"faults: {flight.config.airframe} has motors 1 to {motors}, not {fault.motor.number}")
-        if fault.link is not None and fault.link.name == "ground_station" and not self._run.stations:
-            raise UserError("faults: link ground_station: the scenario needs has_ground_station: true")
-        if fault.link is not None and fault.link.name == "companion" and self._run.companion is None:
-            raise UserError("faults: link companion: the vehicle has no policy")
+    def _end(self, ended: tuple[Fault, float]) -> None:
+        """What it changed is as before, or as another fault of the same thing has it."""
+        self._active.remove(ended)
+        fault = ended[0]
+        left = self._same(fault)
+        if not left:
+            self._change(fault, is_on=False)
+        elif fault.link is None:
+            self._change(left[-1], is_on=True)
+        self._run.note(f"over: {fault.in_words}", fault.vehicle)
+
+    def _same(self, fault: Fault) -> list[Fault]:
+        """Those of the same thing that have begun and not ended."""
+        return [other for other, _ in self._active if other.thing == fault.thing]
+
+    def _check(self, faults: Sequence[Fault]) -> None:
+        asked = self._run.scenario.model_copy(update={"faults": tuple(faults)})
+        check_faults(asked, [vehicle.flight.config for vehicle in self._run.vehicles])
 
     def _change(self, fault: Fault, *, is_on: bool) -> None:
         flight = self._vehicle(fault).flight

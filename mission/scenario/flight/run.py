@@ -106,6 +106,8 @@ class Run:
     """What judges how the policy follows, once it does."""
     figures: dict[str, float] = field(default_factory=dict)
     """Measured on the way, for the result."""
+    events: list[tuple[float, int, str]] = field(default_factory=list)
+    """What the scenario did, faults and marks: simulated time [s], number of the vehicle (0: of all), in words."""
 
     @property
     def drones(self) -> list[Drone]:
@@ -122,4 +124,10 @@ class Run:
 
     def mark(self, name: str) -> None:
         """Gives this moment a name; the first of a name counts."""
-        self.marks.setdefault(name, self.time_s)
+        if name not in self.marks:
+            self.marks[name] = self.time_s
+            self.note(f"mark: {name}")
+
+    def note(self, text: str, vehicle: int = 0) -> None:
+        """Something that the scenario did now."""
+        self.events.append((self.time_s, vehicle, text))

@@ -1,6 +1,6 @@
 """Checks of what happens: time, modes, texts, charge, the end, conditions, touches, and how a policy does."""
 
-from math import isfinite, nan
+from math import isfinite, isinf, nan
 
 import numpy as np
 
@@ -29,7 +29,7 @@ def modes(seen: Seen, check: c.Check, asked: c.Modes) -> Judged:
     frames = seen.history.is_armed & (seen.time_s >= start_s) & (seen.time_s <= end_s)
     modes, time_s = seen.history.mode[frames], seen.time_s[frames]
     if not len(modes):
-        raise NothingToJudge("it was never armed")
+        raise NothingToJudge("it was not armed then" if seen.history.is_armed.any() else "it was never armed")
     firsts = np.concatenate([[0], np.flatnonzero(np.diff(modes)) + 1])
     had = [Mode(int(modes[k])).name.lower() for k in firsts]
     wanted = list(asked.order)
@@ -177,9 +177,10 @@ def touch_down(seen: Seen, check: c.Check, asked: c.TouchDown) -> Judged:
     """How hard it touched the ground."""
     start_s, end_s = seen.ends(check)
     touches = [(at, speed) for at, speed, is_ground in seen.vehicle.witness.touches
-               if is_ground and start_s <= at <= end_s]  # fmt: skip
+               if is_ground and max(start_s, seen.first_flown_s) <= at <= end_s]  # fmt: skip
     if not touches:
-        raise NothingToJudge("it never touched the ground")
+        never = isinf(seen.first_flown_s)
+        raise NothingToJudge("it never flew" if never else "it never touched the ground after it flew")
     time_s, speed = (np.array(column) for column in zip(*touches, strict=True))
     yield most("touch down", speed, time_s, asked.max_m_s, "m/s", what="touches the ground")
 

@@ -14,13 +14,14 @@ import numpy.typing as npt
 
 from autopilot.interface.vehicle_state import Mode
 from mission.log.flight_recorder import History
-from mission.scenario.flight.quantities import Moments, moments_of
-from mission.scenario.flight.run import Run, VehicleRun
+from mission.scenario.flight.quantities import VALUES, Moments, moments_of
+from mission.scenario.flight.run import TOUCH_HEIGHT_M, Run, VehicleRun
 from mission.scenario.parts import checks as c
 from mission.scenario.result import CheckResult
 from mission.scenario.scenario import ITEM_MARK
 
 Rows = npt.NDArray[Any]
+NO_PART = "there was no such part of the flight"
 Judged = Iterator[CheckResult]
 
 
@@ -53,6 +54,13 @@ class Seen:
         armed = self.history.is_armed
         return armed if armed.any() else np.ones(len(armed), bool)
 
+    @cached_property
+    def first_flown_s(self) -> float:
+        """When it was higher than where it stood first; inf: never."""
+        heights = VALUES["above_ground"](self.moments)
+        up = np.flatnonzero(heights > heights[0] + TOUCH_HEIGHT_M)
+        return float(self.time_s[up[0]]) if len(up) else inf
+
     def moment(self, given: float | str | None, without: float) -> float:
         """The time of an end of a check's part.
 
@@ -73,8 +81,15 @@ class Seen:
         return given
 
     def ends(self, check: c.Check) -> tuple[float, float]:
-        """The part that a check looks at [s]."""
-        return self.moment(check.from_, 0.0), self.moment(check.to, inf)
+        """The part that a check looks at [s].
+
+        Raises:
+            NothingToJudge: it begins after the flight's end, or after its own.
+        """
+        start_s, end_s = self.moment(check.from_, 0.0), self.moment(check.to, inf)
+        if start_s > min(end_s, self.end_s):
+            raise NothingToJudge(NO_PART)
+        return start_s, end_s
 
     def frames(self, check: c.Check, *, only_armed: bool = True) -> Rows:
         """Which frames a check looks at.
@@ -89,7 +104,7 @@ class Seen:
         if check.during is not None:
             frames = frames & self.history.is_armed & (self.history.mode == int(Mode[check.during.upper()]))
         if not frames.any():
-            raise NothingToJudge("there was no such part of the flight")
+            raise NothingToJudge(NO_PART)
         return frames
 
 

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import ConfigDict, Field, model_validator
 
 from mission.scenario.parts.conditions import Condition
-from mission.scenario.parts.part import Finite, Metres, OneOf, Part, Place, Point, Seconds, Short
+from mission.scenario.parts.part import Finite, Metres, OneOf, Part, Place, Point, Seconds, Short, check_order
 from mission.scenario.parts.steps import ModeName
 
 
@@ -22,6 +22,7 @@ class Range(Part):
     def _has_a_bound(self) -> Self:
         if self.min is None and self.max is None:
             raise ValueError("needs min, max or both")
+        check_order(self.min, self.max)
         return self
 
 
@@ -105,6 +106,11 @@ class Duration(Part):
 
     min_s: Seconds | None = None
     max_s: Seconds | None = None
+
+    @model_validator(mode="after")
+    def _is_in_order(self) -> Self:
+        check_order(self.min_s, self.max_s, ("min_s", "max_s"))
+        return self
 
 
 class Modes(Short):
@@ -202,6 +208,11 @@ class Following(Part):
     distance_max_m: Metres | None = None
     has_collision: bool | None = False
 
+    @model_validator(mode="after")
+    def _is_in_order(self) -> Self:
+        check_order(self.distance_min_m, self.distance_max_m, ("distance_min_m", "distance_max_m"))
+        return self
+
 
 FigureName = Literal[
     "success", "tracking", "collision", "in_band", "distance_rmse_m", "distance_median_m", "bearing_error_deg",
@@ -267,3 +278,9 @@ class Check(OneOf):
     scorecard: dict[FigureName, Range] | None = None
     """Figures of the scorecard of FollowMe, as `honeyguide follow` shows them, each with its bounds."""
     interventions: Interventions | None = None
+
+    @model_validator(mode="after")
+    def _looks_at_something(self) -> Self:
+        if not isinstance(self.from_, str) and not isinstance(self.to, str):
+            check_order(self.from_, self.to, ("from", "to"))
+        return self

@@ -95,6 +95,21 @@ class Fault(OneOf):
     link: LinkFault | None = None
     wind: WindFault | None = None
 
+    @property
+    def thing(self) -> tuple[str | int, ...]:
+        """What fails: two faults of one thing are not independent."""
+        if self.wind is not None:
+            return ("wind",)  # it is one air
+        which = {"sensor": "name", "motor": "number", "link": "name"}.get(self.name_chosen)
+        return (self.vehicle, self.name_chosen, getattr(self.chosen, which) if which else "")
+
+    @property
+    def in_words(self) -> str:
+        """As "sensor gnss off"."""
+        given = self.chosen.model_dump(exclude_none=True)
+        words = (str(value) if key in ("name", "mode") else f"{key} {value:g}" for key, value in given.items())
+        return " ".join((self.name_chosen, *words))
+
     @model_validator(mode="after")
     def _has_one_time(self) -> Self:
         if (self.at is None) == (self.when is None):

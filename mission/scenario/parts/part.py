@@ -11,7 +11,10 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from common.config.refusal import meant_or_known, shown
+from mission.console.option_checks import UserError
 
+Key = tuple[str | int, ...]
+"""The path of a key of a scenario: `("checks", 0, "from")`."""
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Metres = Annotated[float, Field(ge=0.0, le=100_000.0)]
 Seconds = Annotated[float, Field(ge=0.0, le=36_000.0)]
@@ -19,6 +22,33 @@ Point = tuple[Finite, Finite, Finite]
 """North, east, down of home [m]."""
 Place = tuple[Finite, Finite]
 """North, east of home [m]."""
+
+
+class KeyRefusal(UserError):
+    """A key of a scenario says something that is wrong.
+
+    Args:
+        key: which, from the part on that refuses it.
+        sentence: what is wrong, without the key.
+    """
+
+    def __init__(self, key: Key, sentence: str) -> None:
+        super().__init__(key, sentence)
+        self.key, self.sentence = key, sentence
+
+    def __str__(self) -> str:
+        return f"{key_text(self.key)}: {self.sentence}"
+
+
+def key_text(key: Key) -> str:
+    """A key as people write it: checks[0].from."""
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in key).removeprefix(".")
+
+
+def check_order(low: float | None, high: float | None, names: tuple[str, str] = ("min", "max")) -> None:
+    """Refuses bounds between which nothing is."""
+    if low is not None and high is not None and low > high:
+        raise ValueError(f"{names[0]} {low:g} is above {names[1]} {high:g}")
 
 
 class Part(BaseModel):

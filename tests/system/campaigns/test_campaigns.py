@@ -2,10 +2,12 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -90,6 +92,16 @@ def test_a_campaign_killed_on_the_way_goes_on_and_flies_nothing_twice(tmp_path):
     )
     assert again.exit_code == (0 if worst["passed"] else 1), again.output
     assert f"{worst['margins']['hold']:.3g} m" in again.output
+    own = folder / "worst" / f"{worst['phase']}-{worst['number']}"  # its logs are of that flight, too
+    kept = {check["name"]: check["margin"] for check in json.loads((own / "result.json").read_text())["checks"]}
+    assert kept["hold"] == worst["margins"]["hold"]
+    times = [path.stat().st_mtime_ns for path in folder.glob("worst/*/flight.ulg")]
+    assert len(times) == 6
+    (own / "result.json").unlink()  # as if it had been killed before the last was written
+    assert campaign(file, "--folder", folder, "--jobs", 1).exit_code == 0
+    assert (own / "result.json").is_file()
+    assert len(set(times) - {path.stat().st_mtime_ns for path in folder.glob("worst/*/flight.ulg")}) == 1
+
     page = (folder / "report.html").read_text()
     assert page.count("<svg") >= 3
     assert "http" not in page.replace("http://www.w3.org", "").replace("http://purl.org", "").replace(
@@ -115,6 +127,8 @@ def test_a_run_that_crashes_or_hangs_is_a_finding(tmp_path):
         2.0: "hung: its process was ended after 20 s",
     }
     assert "not met" in result.output
+    with_logs = {path.parent.name for path in (tmp_path / "out").glob("worst/*/flight.ulg")}
+    assert with_logs == {f"sample-{run['number']}" for run in runs_in(tmp_path / "out") if not run["is_lost"]}
 
 
 def test_wrong_input_is_2(tmp_path):
@@ -161,10 +175,34 @@ def test_the_example_of_the_page_flies(tmp_path):
     assert given.runs == 1000
     result = campaign(file, "--runs", 8, "--batch", "--folder", tmp_path / "out")
     assert result.exit_code in (0, 1), result.output
-    assert len(runs_in(tmp_path / "out")) > 8
+    runs = runs_in(tmp_path / "out")
+    assert len(runs) > 8
+    assert {run["check"] for run in runs} == {"place: place"}
+    assert not any(run["margin"] is None or "never happened" in run["error"] for run in runs)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         "campaign.json", "runs.jsonl", "summary.json", "report.html", "overview.png", "worst",
     }  # fmt: skip
+    worst = json.loads((tmp_path / "out" / "summary.json").read_text())["worst"]
+    names = {f"{each['phase']}-{each['number']}" for each in worst}
+    reviewed = CliRunner().invoke(app, ["review", str(tmp_path / "out")])
+    assert reviewed.exit_code == 0, reviewed.output
+    index = (tmp_path / "out" / "review.html").read_text()
+    assert set(re.findall(r'href="worst/([\w-]+)/review.html"', index)) == names
+    assert len(names) == 10
+
+
+def test_the_fault_of_the_example_comes_before_its_shortest_flight_ends(tmp_path):
+    (text,) = [block for block in blocks(PAGE, "yaml") if block.startswith("# landing")]
+    file = tmp_path / "landing.campaign.yaml"
+    file.write_text(text)
+    given = read_campaign(file)
+    quick = {
+        "wind.speed_m_s": 0.0,
+        "faults.0.at": given.vary["faults.0.at"].values[1],
+        "vehicle.parameters.MPC_XY_P": 2.0,
+    }
+    record = fly_run(given, replace(sample_orders(given, 1)[0], values=quick))
+    assert "never happened" not in record.error
 
 
 RAY_HEAD = "127.0.0.1:6399"

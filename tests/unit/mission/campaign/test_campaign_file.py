@@ -23,6 +23,7 @@ scenario:
       wind: {speed_m_s: 5}
   checks:
     - altitude: {max: 6}
+    - at_end: {is_armed: false}
 vary:
   wind.speed_m_s: {uniform: [0, 8]}
 """
@@ -56,7 +57,7 @@ def test_a_scenario_may_be_a_file_beside_it(tmp_path):
     ("old", "new", "sentence"),
     [
         ("runs: 10", "runz: 10", ":1: runz: unknown key; did you mean runs?"),
-        ("{uniform: [0, 8]}", "{uniform: [8, 0]}", ":13: vary.wind.speed_m_s: uniform: the first bound must be"),
+        ("{uniform: [0, 8]}", "{uniform: [8, 0]}", ":14: vary.wind.speed_m_s: uniform: the first bound must be"),
         ("{uniform: [0, 8]}", "{unifrom: [0, 8]}", "vary.wind.speed_m_s.unifrom: unknown key; did you mean uniform?"),
         ("{uniform: [0, 8]}", "{loguniform: [0, 8]}", "loguniform: bounds must be above 0, not 0"),
         ("{uniform: [0, 8]}", "{uniform: [0, 80]}", "so: wind.speed_m_s: must be at most 20, not 80"),
@@ -68,6 +69,7 @@ def test_a_scenario_may_be_a_file_beside_it(tmp_path):
         ("runs: 10", "require: success > 1", "require: must be 'success >= FRACTION', as 'success >= 0.95'"),
         ("runs: 10", "search: {bisect: noise}", "search[0]: 'noise' is not among the varied: wind.speed_m_s"),
         ("runs: 10", "search: {bsect: noise}", "hop.campaign.yaml:1: search"),
+        ("runs: 10", "margin: hight", ":1: margin: no check is called 'hight'; there are altitude, at end"),
     ],
 )  # fmt: skip
 def test_a_fault_is_one_sentence_with_its_place(tmp_path, old, new, sentence):

@@ -8,7 +8,7 @@ pytest_plugins = "pytester"
 
 MARKERS = {
     "airfrme='x500'": "*: unknown key airfrme; did you mean airframe[?]",
-    "airframe='x5000'": "*::test_it: @pytest.mark.honeyguide: unknown airframe 'x5000'; known: *",
+    "airframe='x5000'": "*::test_it: @pytest.mark.honeyguide: *airframe: unknown airframe 'x5000'; known: *",
     "wind='strong'": "*: wind: must be a mapping of keys to values, not 'strong'",
     "wind=50": "*: wind.speed_m_s: must be at most 20, not 50",
     "world='moon'": "*: world.kind: must be *, not 'moon'",
@@ -18,7 +18,7 @@ MARKERS = {
     "5": "*: takes keys only, as wind=5, not 5",
     "plan='none.plan'": "*: */none.plan: *",
     "checks=[{'tlt': {'max': 3}}]": "*: checks[[]0]: tlt: unknown key; did you mean tilt[?]",
-    "faults=[{'at': 1, 'motor': {'number': 7}}]": "*: faults: x500 has motors 1 to 4, not 7",
+    "faults=[{'at': 1, 'motor': {'number': 7}}]": "*: faults[[]0].motor.number: x500 has motors 1 to 4, not 7",
     "parameters={'MPC_XY_VEL_MX': 3}": "*MPC_XY_VEL_MX*",
     "airframe='x500', vehicles=[{}]": "*: airframe: is of a vehicle, write it there",
 }

@@ -127,6 +127,59 @@ def test_checks_are_read_as_far_as_they_can_be(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ('{"checks": 5}', "checks: must be a list, not 5"),
+        ('{"checks": [{"name": "hold", "mar', "is no JSON: line 1: unterminated string starting at"),
+        ("[]", "must be a mapping, not a list"),
+        ("[" * 100_000, "is nested too deeply"),
+        (b"\xff\xfe", "is not UTF-8 text"),
+    ],
+)
+def test_a_wrong_result_is_said_and_the_flight_is_reviewed_without_it(px4_log, tmp_path, text, wrong):
+    folder = run(tmp_path / "run", px4_log, hold=1.0)
+    file = folder / "result.json"
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    outcome = review(folder)
+    assert outcome.exit_code == 0
+    assert f"{file}: {wrong}: no checks are shown" in outcome.output
+    assert data_of(folder / "review.html")["flights"][0]["checks"] == []
+
+
+def test_a_result_that_is_right_or_not_there_is_not_spoken_of(px4_log, tmp_path):
+    folder = run(tmp_path / "run", px4_log, hold=1.0)
+    assert "no checks" not in review(folder).output
+    (folder / "result.json").unlink()
+    assert "no checks" not in review(folder).output
+
+
+def test_wrong_results_of_a_folder_of_runs_are_named_one_by_one(px4_log, tmp_path):
+    for name in ("one", "two"):
+        (run(tmp_path / name, px4_log) / "result.json").write_text("{")
+    outcome = review(tmp_path)
+    assert outcome.exit_code == 0
+    assert outcome.output.count("is no JSON") == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        (
+            "campaign.json",
+            "the campaign has kept none of its worst runs; the same honeyguide campaign command flies them",
+        ),
+        ("hop.scenario.yaml", "hop.scenario.yaml --keep FOLDER keeps one that fails"),
+    ],
+)
+def test_of_what_has_no_logs_it_says_what_it_is(tmp_path, name, sentence):
+    (tmp_path / name).write_text("{}")
+    outcome = review(tmp_path)
+    assert outcome.exit_code == 2
+    assert f"honeyguide: {tmp_path}: holds no log: " in outcome.stderr
+    assert sentence in outcome.stderr
+
+
+@pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
         (["nowhere.ulg"], "nowhere.ulg: there is no such log or folder"),

@@ -6,8 +6,9 @@ from math import isnan
 import pytest
 
 from mission.console.option_checks import UserError
-from mission.scenario.runner import run_scenario
+from mission.scenario.runner import UnderWay, run_scenario
 from mission.scenario.scenario import Scenario
+from sim.faults import FAULT_MODES
 
 PLAIN = {"kind": "plain"}
 HOP = ["arm", {"takeoff": 5}, {"mark": "up"}, {"hold": 3}, {"mark": "held"}, "land"]
@@ -138,6 +139,60 @@ def test_faults_come_at_their_time_or_condition_and_go():
 def test_a_fault_that_never_happens_is_an_error():
     result = flown(faults=[{"when": "altitude > 90", "battery": 0.1}])
     assert result.error == "a fault never happened: altitude > 90"
+
+
+def test_of_two_faults_of_one_thing_the_one_that_ends_first_does_not_mend_the_other():
+    jammed = {"at": 4, "sensor": {"name": "gnss", "mode": "noisy", "magnitude": 2}, "for_s": 4}
+    off = {"at": 6, "sensor": {"name": "gnss", "mode": "off"}, "for_s": 6}
+    gust = {"at": 5, "wind": {"speed_m_s": 8}, "for_s": 2}
+    cut = [{"at": at, "link": "sticks", "for_s": 2} for at in (5, 6)]
+    scenario = Scenario.model_validate(
+        {"world": PLAIN, "vehicle": {"script": HOP}, "faults": [jammed, off, gust, *cut], "checks": []}
+    )
+    under_way = UnderWay(scenario, 1, None)
+    flight = under_way.run.vehicles[0].flight
+    under_way.start()
+    modes = {}
+    for second in (5, 7, 9, 13):
+        under_way.fly(lambda end_us=second * 1_000_000: flight.time_us >= end_us)
+        modes[second] = int(flight.rig.rows["faults"][0]["gnss"]["mode"])
+    result = under_way.end()
+    assert modes == {5: FAULT_MODES["noisy"], 7: FAULT_MODES["off"], 9: FAULT_MODES["off"], 13: FAULT_MODES["none"]}
+    assert (4.0, 1, "fault: sensor gnss noisy magnitude 2") in result.events
+    assert (12.0, 1, "over: sensor gnss off") in result.events
+    assert [text for _, _, text in result.events].count("mark: up") == 1
+
+
+@pytest.mark.parametrize(
+    "check",
+    [
+        {"duration": {"max_s": 20}},
+        {"no_contact": {}},
+        {"not_heard": "landed"},
+        {"modes": ["land"]},
+        {"touch_down": 1.0},
+    ],
+)
+def test_a_part_that_does_not_exist_fails_each_check(check):
+    (found,) = flown(checks=[{**check, "from": 300}]).checks
+    assert not found.passed
+    assert found.happened == "there was no such part of the flight"
+
+
+def test_standing_is_no_touch_down():
+    (found,) = flown(script=["arm", {"wait": 2}, "disarm"], checks=[{"touch_down": 1.0}]).checks
+    assert not found.passed
+    assert found.happened == "it never flew"
+    (found,) = flown(checks=[{"touch_down": 1.0}]).checks
+    assert found.worst_s > 8.0
+
+
+@pytest.mark.parametrize("airframe", ["x500", "rover"])
+def test_it_knows_where_it_starts_before_it_may_be_armed(airframe):
+    script = ["arm", {"wait": 1}, "disarm"]
+    vehicle = {"airframe": airframe, "start": {"ne_m": [120, -80]}}
+    (found,) = flown(script=script, vehicle=vehicle, checks=[{"estimator": {"horizontal_m": 3}}]).checks
+    assert found.passed, found.happened
 
 
 def test_a_battery_may_be_half_full():

@@ -1,16 +1,18 @@
 """Scenario files: what may be written short, and the sentence that each fault gets."""
 
+import pickle
 from dataclasses import fields
 from typing import get_args
 
 import pytest
 import yaml
+from PIL import Image
 
 from autopilot.interface.vehicle_state import Mode
 from common.intervals import Interval
 from mission.console.option_checks import UserError
 from mission.flight_settings import WORLD_KINDS
-from mission.scenario.flight.building import flight_configs
+from mission.scenario.flight.building import check_scenario, flight_configs
 from mission.scenario.flight.flying import ACTIONS
 from mission.scenario.judging.judge import JUDGES
 from mission.scenario.parts.checks import Check, FigureName
@@ -96,7 +98,51 @@ def test_python_makes_the_same_scenario(tmp_path):
         ("about: Up and down.", "about: [", "not YAML"),
         ("vehicle:\n", "vehicle:\n  plan: a.plan\n", "2: vehicle: plan and script: choose one"),
         ("checks:", "faults: [{at: 1, when: speed > 1, battery: 0.1}]\nchecks:", "7: faults[0]: a fault has either at"),
-        ("- at_end", "- tilt: {max: 3}\n    from: upp\n  - at_end", "1: checks[0]: nothing makes a mark 'upp'"),
+        ("- at_end", "- tilt: {max: 3}\n    from: upp\n  - at_end", "9: checks[0].from: nothing makes a mark 'upp'"),
+        (
+            "- at_end",
+            "- tilt: {max: 3}\n    from: 3\n    vehicle: 3\n  - at_end",
+            "10: checks[0].vehicle: there is no vehicle 3; there is one vehicle, 1",
+        ),
+        (
+            "checks:",
+            "faults:\n  - at: 1\n    battery: 0.1\n    vehicle: 3\nchecks:",
+            "10: faults[0].vehicle: there is no vehicle 3; there is one vehicle, 1",
+        ),
+        (
+            "- at_end: {is_armed: false}",
+            "- near: {to_vehicle: 2, within_m: 3}",
+            "8: checks[0].near.to_vehicle: there is no vehicle 2; there is one vehicle, 1",
+        ),
+        ("- at_end", "- tilt: {max: 3}\n    fron: 3\n  - at_end", "9: checks[0].fron: unknown key; did you mean from?"),
+        (
+            "- at_end",
+            "- tilt: {max: 3}\n    xyz: 3\n  - at_end",
+            "9: checks[0].xyz: unknown key; there are name, from,",
+        ),
+        (
+            "- at_end: {is_armed: false}",
+            "- away: {pont: [0, 0, 0], min_m: 3}",
+            "8: checks[0].away.pont: unknown key; did you mean point?",
+        ),
+        ("at_end: {is_armed: false}", "altitude: {min: 10, max: 5}", "8: checks[0].altitude: min 10 is above max 5"),
+        (
+            "at_end: {is_armed: false}",
+            "scorecard: {in_view: {min: 0.9, max: 0.5}}",
+            "8: checks[0].scorecard.in_view: min 0.9 is above max 0.5",
+        ),
+        (
+            "at_end: {is_armed: false}",
+            "duration: {min_s: 10, max_s: 5}",
+            "8: checks[0].duration: min_s 10 is above max_s 5",
+        ),
+        (
+            "at_end: {is_armed: false}",
+            "following: {distance_min_m: 3, distance_max_m: 2}",
+            "8: checks[0].following: distance_min_m 3 is above distance_max_m 2",
+        ),
+        ("- at_end", "- tilt: {max: 3}\n    from: 8\n    to: 5\n  - at_end", "8: checks[0]: from 8 is above to 5"),
+        ("about:", "vehicles: [{}]\nabout:", "1: vehicles: there is vehicle, too: choose one"),
         ("- at_end", "- tilt: {max: 3}\n    speed: {max: 3}\n  - at_end", "names speed and tilt: put each in an entry"),
     ],
 )
@@ -135,6 +181,7 @@ def test_scenarios_that_ship_say_what_they_show_and_ask_something(path):
     assert scenario.about.endswith(".")
     assert scenario.checks
     assert flight_configs(scenario, 1)
+    check_scenario(scenario, path.name)
     dumped = yaml.safe_dump(scenario.model_dump(mode="json", by_alias=True, exclude_unset=True))
     assert parse_scenario(dumped, path.name, path.parent) == scenario
 
@@ -154,6 +201,137 @@ def test_names_are_those_of_the_parts_that_do_it():
     assert set(Check.names()) == JUDGES.keys()
     assert set(get_args(FigureName)) == {each.name for each in fields(Scorecard) if each.type is Interval}
     assert set(WORLD_KINDS) < set(get_args(WorldName))
+
+
+def refused(text, tmp_path):
+    """The sentence with which a file that can be read is refused before it is flown."""
+    with pytest.raises(UserError) as refusal:
+        check_scenario(parsed(text, tmp_path), "not its name")
+    said = str(refusal.value)
+    assert "\n" not in said
+    return said.replace(f"{tmp_path.resolve()}/", "").removeprefix("hop.scenario.yaml:")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("vehicle:\n  airframe: x5000\n", "2: vehicle.airframe: unknown airframe 'x5000'; known: c172,"),
+        ("vehicle:\n  airframe: own.toml\n", "2: vehicle.airframe: own.toml: no such file"),
+        ("vehicles:\n  - {}\n  - airframe: x5000\n", "3: vehicles[1].airframe: unknown airframe"),
+        (
+            "vehicle:\n  parameters:\n    MPC_LAND_SPEED: 1\n    MPC_XY_VEL_MAXX: 3\n",
+            "4: vehicle.parameters.MPC_XY_VEL_MAXX: unknown parameter; did you mean MPC_XY_VEL_MAX?",
+        ),
+        (
+            "vehicle:\n  parameters:\n    ZZZZ: 3\n",
+            "3: vehicle.parameters.ZZZZ: unknown parameter; the flight controller of x500 has none of that name",
+        ),
+        (
+            "vehicle:\n  parameters:\n    NAV_DLL_ACT: 99\n",
+            "3: vehicle.parameters.NAV_DLL_ACT: 99 is not between",
+        ),
+        ("vehicle:\n  throw_m_s: 10\n", "2: vehicle.throw_m_s: airframe 'x500': only a plane can be thrown"),
+        ("vehicle:\n  plan: no.plan\n", "2: vehicle.plan: no.plan: no such file"),
+        ("vehicle:\n  plan: hop.py\n", "2: vehicle.plan: hop.py: "),
+        (
+            "vehicle:\n  script:\n    - arm\n    - fly_plan: no.plan\n",
+            "4: vehicle.script[1].fly_plan: no.plan: no",
+        ),
+        ("vehicle:\n  python: no.py:hop\n", "2: vehicle.python: no.py: no such file"),
+        (
+            "vehicle:\n  python: hop.py:jumpp\n",
+            "2: vehicle.python: hop.py: has no coroutine 'jumpp' (async def jumpp(drone): ...); did you mean jump?",
+        ),
+        (
+            "vehicle:\n  python: hop.py:stay\n",
+            "2: vehicle.python: hop.py: has no coroutine 'stay' (async def",
+        ),
+        ("vehicle:\n  python: bad.py:hop\n", "2: vehicle.python: bad.py: is no Python: "),
+        ("world:\n  file: no.world.yaml\n", "2: world.file: no.world.yaml: no such file"),
+        ("world:\n  file: yard.yaml\n", "2: world.file: yard.yaml:1: meshes[0].fil: unknown key; did you mean file?"),
+        ("world:\n  tree_height_min_m: 50\n", "1: world: tree_height_min_m is larger than tree_height_max_m"),
+        (
+            "faults:\n  - at: 1\n    motor:\n      number: 7\n",
+            "4: faults[0].motor.number: x500 has motors 1 to 4, not 7",
+        ),
+        (
+            "faults:\n  - at: 1\n    link: ground_station\n",
+            "3: faults[0].link: ground_station: there is none; add has_ground_station: true",
+        ),
+        (
+            "faults:\n  - at: 1\n    link: companion\n",
+            "3: faults[0].link: companion: there is none, the vehicle has no policy",
+        ),
+        (
+            "vehicles: [{airframe: rover}, {}]\nfaults:\n  - {at: 1, vehicle: 2, sensor: {name: wheels, mode: off}}\n",
+            "3: faults[0].sensor.name: x500 has no sensor wheels; it has gyro, accel, mag, baro, gnss, range, battery",
+        ),
+        (
+            "faults: [{at: 1, sensor: {name: airspeed, mode: stuck}}]\n",
+            "1: faults[0].sensor.name: x500 has no sensor airspeed; it has gyro,",
+        ),
+        (
+            "vehicle:\n  airframe: rover\nfaults: [{at: 1, sensor: {name: airspeed, mode: stuck}}]\n",
+            "3: faults[0].sensor.name: rover has no sensor airspeed; it has gyro, accel, mag, baro, gnss, range",
+        ),
+        (
+            "vehicles:\n  - start: {ne_m: [5, 5]}\n  - {}\n  - start:\n      ne_m: [5.5, 5]\n",
+            "5: vehicles[2].start.ne_m: vehicles 1 and 3 start 0.5 m apart, at least 1 m are needed",
+        ),
+        (
+            "vehicles:\n  - {}\n  - start:\n      ne_m: [0, 0]\n",
+            "4: vehicles[1].start.ne_m: vehicles 1 and 2 start 0 m apart",
+        ),
+        (
+            "world: {size_m: 200}\nvehicle:\n  start:\n    ne_m: [0, -101]\n",
+            "4: vehicle.start.ne_m: is outside of the world, which ends 100 m to each side of home",
+        ),
+        ("world: {size_m: 50}\nvehicles:\n  - count: 50\n", "2: vehicles: the world has free ground for"),
+    ],
+)
+def test_what_cannot_be_flown_is_refused_before_with_its_place(tmp_path, text, said):
+    (tmp_path / "hop.py").write_text("def stay(drone): pass\nasync def jump(drone): pass\n")
+    (tmp_path / "bad.py").write_text("async def\n")
+    (tmp_path / "yard.yaml").write_text("meshes: [{fil: tower.stl}]\n")
+    assert refused(text, tmp_path).startswith(said)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "vehicle: {airframe: plane, python: 'hop.py:jump'}\nfaults: [{at: 1, sensor: {name: airspeed, mode: stuck}}]\n",
+        "vehicle: {airframe: rover, python: 'hop.py:sail'}\nfaults: [{at: 1, sensor: {name: wheels, mode: stuck}}]\n",
+        "vehicle: {airframe: f550, python: 'hop.py:made'}\nfaults: [{at: 1, motor: {number: 6}}]\n",
+        "has_ground_station: true\nfaults: [{at: 1, link: ground_station}]\n",
+        "vehicles: [{start: {ne_m: [5, 5]}}, {start: {ne_m: [5, 6]}}]\nworld: {size_m: 50}\n",
+        "vehicle: {start: {ne_m: [100, -100]}}\nworld: {size_m: 200}\n",
+        "checks: [{altitude: {min: 5, max: 5}}]\n",
+    ],
+)
+def test_what_can_be_flown_is_not_refused(tmp_path, text):
+    lines = ("import sea", "async def jump(drone): pass", "from sea import sail", "made = sea.wrapped(jump)")
+    (tmp_path / "hop.py").write_text("\n".join(lines))
+    check_scenario(parsed(text, tmp_path), "hop")
+
+
+def test_a_start_is_within_the_map_of_a_heightmap(tmp_path):
+    Image.new("L", (21, 21)).save(tmp_path / "flat.png")
+    heights = "{file: flat.png, metres_per_pixel: 10, height_min_m: 0, height_max_m: 1}"
+    (tmp_path / "yard.yaml").write_text(f"heightmap: {heights}\n")
+    text = "world: {file: yard.yaml}\nvehicle: {start: {ne_m: [0, 101]}}\n"
+    assert refused(text, tmp_path).startswith("2: vehicle.start.ne_m: is outside of the world, which ends 100 m")
+
+
+def test_what_python_made_is_refused_with_the_key(tmp_path):
+    with pytest.raises(UserError, match=r"^mine: vehicle\.airframe: unknown airframe 'x5000'"):
+        check_scenario(Scenario(vehicle={"airframe": "x5000"}), "mine")
+
+
+def test_a_scenario_knows_its_lines_wherever_it_is_sent(tmp_path):
+    scenario = parsed("vehicle:\n  airframe: x5000\n", tmp_path)
+    sent = pickle.loads(pickle.dumps(scenario.model_copy(update={"seeds": (3,)})))
+    with pytest.raises(UserError, match=r"^hop\.scenario\.yaml:2: vehicle\.airframe: "):
+        check_scenario(sent, "not its name")
 
 
 def test_a_wrong_parameter_is_refused_before_anything_flies():

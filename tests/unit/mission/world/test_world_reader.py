@@ -66,6 +66,12 @@ def test_files_are_looked_for_beside_the_file_that_names_them(tmp_path):
             "height_m: 5", "height_m: 5, frotz: 1",
             "yard.yaml:10: cylinders[0].frotz: unknown key; allowed are position_ned_m, radius_m, height_m, colour",
         ),
+        ("size_m: 200", "meshes: [{fil: tower.stl}]", "yard.yaml:1: meshes[0].fil: unknown key; did you mean file?"),
+        (
+            "size_m: 200", "meshes:\n  - heading_deg: 3\n    fil: tower.stl",
+            "yard.yaml:3: meshes[0].fil: unknown key; did you mean file?",
+        ),
+        ("size_m: 200", "meshes: [{heading_deg: 3}]", "yard.yaml:1: meshes[0].file: is required"),
         ("size_m: 200", "size_m: wide", "yard.yaml:1: size_m: must be a number, not 'wide'"),
         (
             "size_m: 200", "heightmap: {file: hills.png}",
