@@ -29,7 +29,7 @@ def write_page(
         f"Logged: {sizes['clumsy']} flights of the mediocre pilot and {sizes['shipped']} of the follower that ships, "
         f"{sizes['seconds']:.0f} s each, {forecast['decisions']:,} decisions; {sizes['steps']:,} gradient steps each.",
         "",
-        "| learnt by | forecast from the logs: doubly robust | fitted Q | outside of the data | walk, batch | run, batch |",
+        "| learnt by | forecast, doubly robust | fitted Q | outside of the data | walk, batch | run, batch |",
         "|---|---|---|---|---|---|",
     ]
     for name, found in sorted(forecast["policies"].items(), key=lambda item: -item[1]["robust"]["value"]):

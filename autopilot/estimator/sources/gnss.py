@@ -61,8 +61,6 @@ _DOUBTED_HEADING_STD = wp.constant(0.2)  # [rad]
 _DOUBTED_BODY_FRACTION = wp.constant(4.0)  # of the body field's deviation at the start
 _LOST_VAR = wp.constant(1.1e4)  # [m²] beyond 100 m the position is set by a fix: float32 would not subtract well
 _NOWHERE_VAR = wp.constant(25.0)  # [m²] beyond 5 m the first fix sets it: fused, the present would glide there
-    25.0
-)  # [m²] beyond 5 m the first fix sets it: fused, the present would glide there in a second
 _RESET_AFTER_S = wp.constant(5.0)  # nothing passed for so long: believe the receiver rather than the dead reckoning
 
 

@@ -124,8 +124,9 @@ class Guard:
 
         With one it turns on the spot too now and then: the phone may be wrong.
         """
-        s = self.settings
-        down = -CLIMB_M_S * float(np.clip(2.0 * (s.search_height_m - own.range_m), -0.5, 1.0))
+        s, among = self.settings, self._is_among_others
+        height_m = s.search_among_height_m if among else s.search_height_m
+        down = -CLIMB_M_S * float(np.clip(2.0 * (height_m - own.range_m), -0.5, 1.0))
         down = down if isfinite(own.range_m) else 0.0
         track = self.senses.watch.track
         if self.senses.is_heard and track is not None and track.is_known:
@@ -135,7 +136,7 @@ class Guard:
             if not is_searching or far_m < 0.1:
                 self._there_us = own.boot_us
                 return np.zeros(2), down, yaw_rate
-            stand_off_m = s.search_among_m if self._is_among_others else s.search_stand_off_m
+            stand_off_m = s.search_among_m if among else s.search_stand_off_m
             speed = min(stopping_speed(far_m - stand_off_m, s.reaction_s, 1.0), s.search_speed)
             level = speed * way / far_m
             if far_m > stand_off_m + _THERE_M:

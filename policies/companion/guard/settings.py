@@ -36,8 +36,10 @@ class GuardSettings(BaseModel):
     """... and than this where others were met: from farther away clothes cannot be told apart."""
     search_round_speed: float = Field(default=1.5, ge=0.0)
     """[m/s] round it, where nobody is seen there."""
-    search_height_m: float = Field(default=2.9, gt=0.0)
-    """Above the ground, where it waits and searches: over people, under crowns."""
+    search_height_m: float = Field(default=2.6, gt=0.0)
+    """Above the ground, where it waits and searches: over people, under crowns ..."""
+    search_among_height_m: float = Field(default=2.9, gt=0.0)
+    """... and where others were met: so far over their heads that they are no obstacle."""
     search_yaw_rate: float = Field(default=0.6, gt=0.0)
     """[rad/s]"""
     image_slow_s: float = Field(default=0.55, gt=0.0)
