@@ -14,6 +14,8 @@ from mission.scenario.scenario import Scenario
 from mission.scenario.scenario_file import SUFFIX
 from mission.world.world_copies import keep_world_file
 
+COPIED = (".plan", ".waypoints", ".toml", ".py")
+
 
 def run_folder_of(keep: Path, scenario: Scenario, seed: int) -> Path:
     """Where a run is kept, empty.
@@ -38,9 +40,9 @@ def emptied(folder: Path) -> Path:
 
 
 def keep_scenario(folder: Path, scenario: Scenario, seed: int) -> str:
-    """Writes the scenario of one run beside its logs, with its plans and its world; the command that flies it again."""
+    """Writes the scenario of one run beside its logs, with the files it names; the command that flies it again."""
     given = scenario.model_copy(update={"seeds": (seed,)}).model_dump(mode="json", by_alias=True, exclude_unset=True)
-    _copy_plans(given, folder)
+    _copy_files(given, folder)
     if scenario.world.file is not None:
         given["world"]["file"] = keep_world_file(scenario.world.file, folder)
     path = folder / f"{scenario.name}{SUFFIX}"
@@ -48,16 +50,22 @@ def keep_scenario(folder: Path, scenario: Scenario, seed: int) -> str:
     return f"honeyguide test {shlex.quote(str(path))}"
 
 
-def _copy_plans(given: Any, folder: Path) -> None:
-    """Copies the plans that a scenario names into the folder, and names the copies."""
+def _copy_files(given: Any, folder: Path) -> None:
+    """Copies the plans, airframes and Python files that a scenario names into the folder, and names the copies."""
     if isinstance(given, list):
         for each in given:
-            _copy_plans(each, folder)
+            _copy_files(each, folder)
     elif isinstance(given, dict):
         for key, value in given.items():
-            is_plan = isinstance(value, str) and Path(value).suffix in (".plan", ".waypoints") and Path(value).is_file()
-            if is_plan:
-                shutil.copyfile(value, folder / Path(value).name)
-                given[key] = Path(value).name
-            else:
-                _copy_plans(value, folder)
+            given[key] = _copied(value, folder) if isinstance(value, str) else value
+            _copy_files(value, folder)
+
+
+def _copied(value: str, folder: Path) -> str:
+    """The name of the copy, if this is one of those files, with what follows it of a Python file; else the same."""
+    file, colon, function = value.rpartition(":") if ".py:" in value else (value, "", "")
+    path = Path(file)
+    if path.suffix not in COPIED or not path.is_file():
+        return value
+    shutil.copyfile(path, folder / path.name)
+    return f"{path.name}{colon}{function}"

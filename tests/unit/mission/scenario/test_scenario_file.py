@@ -1,13 +1,16 @@
 """Scenario files: what may be written short, and the sentence that each fault gets."""
 
 import pickle
+import shutil
 from dataclasses import fields
+from pathlib import Path
 from typing import get_args
 
 import pytest
 import yaml
 from PIL import Image
 
+import common.airframes
 from autopilot.interface.vehicle_state import Mode
 from common.intervals import Interval
 from mission.console.option_checks import UserError
@@ -15,6 +18,7 @@ from mission.flight_settings import WORLD_KINDS
 from mission.scenario.flight.building import check_scenario, flight_configs
 from mission.scenario.flight.flying import ACTIONS
 from mission.scenario.judging.judge import JUDGES
+from mission.scenario.keeping import keep_scenario
 from mission.scenario.parts.checks import Check, FigureName
 from mission.scenario.parts.faults import SensorName
 from mission.scenario.parts.steps import ModeName, Step, Takeoff
@@ -24,6 +28,7 @@ from policies.tasks.follow_me.scorecard import Scorecard
 from sim.faults import BIAS_UNITS
 from sim.world.world import WorldConfig
 
+AIRFRAMES = Path(common.airframes.__file__).parent
 HOP = """about: Up and down.
 vehicle:
   script:
@@ -337,3 +342,19 @@ def test_a_scenario_knows_its_lines_wherever_it_is_sent(tmp_path):
 def test_a_wrong_parameter_is_refused_before_anything_flies():
     with pytest.raises(UserError, match="MPC_XY_VEL_MAXX"):
         flight_configs(Scenario(vehicle={"parameters": {"MPC_XY_VEL_MAXX": 3.0}}), 1)
+
+
+def test_a_kept_scenario_needs_no_file_of_where_it_came_from(tmp_path):
+    there, kept = tmp_path / "there", tmp_path / "kept"
+    for folder in (there, kept):
+        folder.mkdir()
+    (there / "mine.toml").write_text((AIRFRAMES / "x500.toml").read_text())
+    (there / "hop.py").write_text("async def hop(drone):\n    await drone.arm()\n")
+    scenario = there / "own.scenario.yaml"
+    scenario.write_text("vehicle: {airframe: mine.toml, python: 'hop.py:hop'}\n")
+    keep_scenario(kept, read_scenario(scenario), 3)
+    shutil.rmtree(there)
+    again = read_scenario(kept / "own.scenario.yaml")
+    check_scenario(again, "own")
+    assert again.seeds == (3,)
+    assert Path(again.vehicle.airframe) == kept / "mine.toml"
