@@ -88,7 +88,7 @@ class Estimator(Part):
 
 
 class Clearance(Short):
-    """It keeps away from trees, walls and boxes, while armed."""
+    """It keeps away from trees, walls, boxes, meshes and pads while armed: what starts on a pad needs a `from`."""
 
     short: ClassVar[str] = "min_m"
     min_m: Metres
