@@ -20,7 +20,7 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
 from policies.companion.vehicle_link import NEVER_US, Own
-from policies.tasks.follow_me.tracked.keep_off import bounds, keep_off, kept_off
+from policies.tasks.follow_me.tracked.keep_off import OVER_M, bounds, keep_off, kept_off
 from policies.tasks.follow_me.tracked.owner_filter import std_along
 
 Floats = NDArray[np.float64]
@@ -177,6 +177,8 @@ class Guard:
             bound = bounds(self._keep_off, wp.vec2(*way), own_vel, vel, vel_std, silence_s, over_m)
             self._is_too_near |= bound.then_m < self.settings.owner_m
             self._sinking_max = min(self._sinking_max, bound.sinking_max)
+            if self.stance is Stance.SEARCH and over_m >= OVER_M:  # it keeps its height
+                continue
             unit = way / max(float(np.hypot(*way)), 1e-3)
             near.append(Somebody(unit, bound.closing_max, bound.then_m < self.settings.pressed_m))
             kept = np.array(kept_off(wp.vec2(*kept), wp.vec2(*way), bound.closing_max))

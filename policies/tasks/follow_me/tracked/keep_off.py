@@ -16,7 +16,7 @@ OWNER_M = 1.15  # [m] to the middle of the person: it comes no nearer
 OWNER_BRAKE_M_S2 = 3.5  # with which the vehicle is taken to brake before them; measured on the x500: 3.0 to 3.5
 REACTION_S = 0.35  # from a setpoint to the motion, besides the age of the picture; measured on the x500
 ESCAPE_CLIMB_M_S = 2.5  # nearer than allowed, until it is over their head
-_OVER_M = wp.constant(1.45)  # so far above their chest it is
+OVER_M = wp.constant(1.45)  # so far above their chest it is
 _OVER_GAIN = wp.constant(2.0)  # [1/s]
 _LATE_S = wp.constant(0.15)  # with older pictures than this
 _HIGH_M = wp.constant(1.0)  # it stays so far above the chest of who is near, from where it is soon over their head
@@ -30,7 +30,6 @@ _LEAVES_M_S = wp.constant(2.0)  # of who does not leave as fast as this: they wo
 _SOON_S = wp.constant(0.8)  # they are given way to as if they had set off so long ago at most
 _BACK_GAIN = wp.constant(5.0)  # [1/s]
 _BACK_MAX_M_S = wp.constant(5.0)
-_ANYTHING_M_S = wp.constant(100.0)
 
 
 @wp.struct
@@ -72,7 +71,7 @@ def distance_then(way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, reaction_s
 @wp.func
 def level_m(k: KeepOff, over_m: float) -> float:
     """How near it may come on the level [m], so far above their chest: an ellipsoid about them, free of it above."""
-    fraction = wp.clamp(over_m / _OVER_M, 0.0, 1.0)
+    fraction = wp.clamp(over_m / OVER_M, 0.0, 1.0)
     return k.owner_m * wp.sqrt(1.0 - fraction * fraction)
 
 
@@ -94,8 +93,6 @@ def closing_max(
     `way` leads to where they would be by now [m]; `own_vel` it has until it answers; how uncertain their velocity is;
     `age_s` ago they were seen; so far above their chest.
     """
-    if over_m >= _OVER_M:
-        return _ANYTHING_M_S
     far_m = wp.max(wp.length(way), 1.0e-3)
     leaving = wp.dot(other_vel, way) / far_m
     sure = wp.max(leaving - vel_std, wp.min(leaving, 0.0))
@@ -125,10 +122,10 @@ def kept_off(velocity: wp.vec2, way: wp.vec2, most: float) -> wp.vec2:
 def sinking_max(k: KeepOff, over_m: float, then_m: float, age_s: float) -> float:
     """How fast it may sink [m/s], so far above their chest and so near, seen so long ago; negative: it has to climb."""
     if then_m < k.owner_m:
-        return wp.max(_OVER_GAIN * (over_m - _OVER_M), -k.escape_climb)
+        return wp.max(_OVER_GAIN * (over_m - OVER_M), -k.escape_climb)
     if then_m < _HIGH_WITHIN_M and age_s > _LATE_S:
         return wp.max(_OVER_GAIN * (over_m - _HIGH_M), -_RISE_M_S)
-    return _ANYTHING_M_S
+    return 100.0
 
 
 @wp.struct
