@@ -6,6 +6,7 @@ import pytest
 from common.image_stream import ImageFrame
 from policies.companion.guard.guard import Guard, Stance
 from policies.companion.guard.settings import GuardSettings
+from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import Own, Owner
 from policies.person_detector.detector import Detection
@@ -142,3 +143,17 @@ def test_a_search_looks_then_goes_round_then_turns_wherever_it_came_from(scene: 
     assert 35 <= min(rounds) < max(rounds) < min(turns)
     assert len(rounds) > 50
     assert len(turns) > 50
+
+
+@pytest.mark.parametrize(("height_m", "is_in_the_way"), [(1.6, True), (2.9, False)])
+def test_a_search_passes_over_the_heads_of_people_but_not_through_them(
+    scene: tuple[Guard, Own, Sees], monkeypatch: pytest.MonkeyPatch, height_m: float, is_in_the_way: bool
+) -> None:
+    guard, own, sees = scene
+    sees.is_there = False
+    somebody = PersonNow(np.array([1.6, 0.0, -1.3]), 0.01 * np.eye(2), np.zeros(2), 0.01 * np.eye(2), 0.0)
+    monkeypatch.setattr(Senses, "others_now", lambda *_: [somebody])
+    own.pos_ned, own.range_m = (0.0, 0.0, -height_m), height_m
+    guard.begin(own)
+    ahead = searched(guard, own, 17.0, 10.0)[-1][0]
+    assert ahead < 0.5 if is_in_the_way else ahead > 2.0
