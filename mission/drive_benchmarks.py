@@ -105,7 +105,7 @@ def _judged(history: History) -> MissionFigures:
     speed = np.hypot(*history.vel_ned_true[:, :2].astype(float).T)
     across: list[float] = []
     overshoot = 0.0
-    start = np.zeros(2)
+    start = here[history.is_armed & (history.mission_seq == 1)][0]  # where it took itself to be
     came_from: Rows | None = None
     for i_leg, corner in enumerate(SQUARE):
         end = np.array(corner)

@@ -54,4 +54,4 @@ def test_what_cannot_be_flown_is_one_sentence(pytester, run):
     (pytester.path / "hop.scenario.yaml").write_text("vehicle: {airframe: x5000}\n")
     result = run()
     result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines(["*hop.scenario.yaml: unknown airframe 'x5000'; known: *"])
+    result.stdout.fnmatch_lines(["*hop.scenario.yaml:1: vehicle.airframe: unknown airframe 'x5000'; known: *"])
