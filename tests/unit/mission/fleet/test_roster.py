@@ -1,5 +1,6 @@
 """Which vehicles a fleet has, where they boot, which ports they have, and what a script is told."""
 
+import socket
 import asyncio
 from math import dist
 
@@ -18,7 +19,7 @@ from mission.flight_config import AIRFIELD, FlightConfig, start_of
 from mission.flight_settings import FlightOptions
 from mission.view.replay_file import load_recording
 from sim.world.world import WorldConfig, build_world
-from tests.system.vehicle import free_ports
+from tests.system.vehicle import free_ports, is_free
 
 FLAT = WorldConfig(size_m=100.0, hill_height_m=0.0, trees_per_ha=0.0)
 
@@ -88,9 +89,10 @@ def test_a_parameter_must_be_one_of_some_vehicle():
 
 def test_ports_are_numbered_as_the_simulators_of_px4_and_ardupilot_do():
     gcs, api = free_ports()
-    tcp = gcs + 2000
+    vehicles = (0, 1, 12)
+    tcp = next(p for p in range(gcs + 2000, 65_000) if all(is_free(p + 10 * i, socket.SOCK_STREAM) for i in vehicles))
     options = FlightOptions(gcs_port=gcs, api_port=api, tcp_port=tcp)
-    for i in (0, 1, 12):
+    for i in vehicles:
         ground, offboard, connected = links = open_links(options, 1.0, i)
         assert ground.links[0].address[1] == gcs
         assert ground.local_port == gcs + 4020 + i
