@@ -1,7 +1,7 @@
 """Which vehicles a fleet has, where they boot, which ports they have, and what a script is told."""
 
-import socket
 import asyncio
+import socket
 from math import dist
 
 import pytest
