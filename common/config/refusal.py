@@ -1,7 +1,7 @@
 """What pydantic found wrong with a configuration, as one sentence for the user."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, get_args
 
 from pydantic import BaseModel
@@ -53,6 +53,12 @@ def sentence(error: ErrorDetails, model: type[BaseModel]) -> str:
     return f"must be {wanted}, not {shown(error['input'])}" if wanted else error["msg"][0].lower() + error["msg"][1:]
 
 
+def without_consequences(errors: Sequence[ErrorDetails]) -> list[ErrorDetails]:
+    """What pydantic found, without the keys that are missing only because they are spelled wrong."""
+    unknown = {each["loc"][:-1] for each in errors if each["type"] == "extra_forbidden"}
+    return [each for each in errors if each["type"] != "missing" or each["loc"][:-1] not in unknown]
+
+
 def faulty_path(error: ErrorDetails) -> tuple[int | str, ...]:
     """The path of the value that is wrong, or of the key that is: pydantic's mark of a key is left out."""
     return tuple(step for step in error["loc"] if step != "[key]")
@@ -84,7 +90,7 @@ def keys_beside(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]
             m for at in models if step in at.model_fields for m in _models_in(at.model_fields[str(step)].annotation)
         ]
         models = below or models  # a list's index, or the name of a parameter: no field
-    return [key for at in models for key in at.model_fields]
+    return [field.alias or key for at in models for key, field in at.model_fields.items()]
 
 
 def _models_in(annotation: Any) -> list[type[BaseModel]]:

@@ -9,7 +9,6 @@ from common.config.yaml_locations import ConfigError, Located, location_at, note
 from mission.campaign.campaign import SEED_KEY, SEED_MAX, Campaign
 from mission.campaign.varying import KeyFault, varied
 from mission.console.option_checks import UserError
-from mission.scenario.parts.checks import Check
 from mission.scenario.scenario import Scenario
 from mission.scenario.scenario_file import read_scenario, scenario_of
 
@@ -62,15 +61,10 @@ def _scenario(root: Located, path: Path) -> Scenario:
 
 def _check_margin(campaign: Campaign, scenario: Scenario, root: Located) -> None:
     """Refuses a margin that is of no check of the scenario."""
-    titles = list(dict.fromkeys(_title(check) for check in scenario.checks))
+    titles = list(dict.fromkeys(check.title for check in scenario.checks))
     if campaign.margin and campaign.margin not in titles:
         wrong = f"no check is called '{campaign.margin}'; there are {', '.join(titles) or 'none'}"
         raise UserError(note_at(root.location_of("margin"), "margin", wrong))
-
-
-def _title(check: Check) -> str:
-    """What the results of a check begin with."""
-    return check.name or check.name_chosen.replace("_", " ")
 
 
 def _check_keys(campaign: Campaign, scenario: Scenario, root: Located) -> None:

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
 from common.config.refusal import NO_SUCH_KEY, meant_or_known
 from common.config.yaml_locations import Located, location_at, note_at
+from mission.console.option_checks import UserError
 from mission.flight_settings import EngineName, Pace
 from mission.scenario.parts.checks import Check
 from mission.scenario.parts.faults import Fault
@@ -252,14 +253,14 @@ class Scenario(Part):
         """Remembers the file that it was read from, for refusals."""
         self._source = Source(root)
 
-    def refusal(self, refused: KeyRefusal, name: str) -> str:
-        """The sentence about a key, with file and line.
+    def refusal(self, refused: UserError, name: str) -> str:
+        """The sentence about what cannot be flown, with file and line if it is about a key.
 
         Args:
             refused: what is wrong.
             name: how a scenario is called that was read from no file.
         """
-        if self._source.root is None:
+        if self._source.root is None or not isinstance(refused, KeyRefusal):
             return f"{name}: {refused}"
         location, key = location_at(self._source.root, refused.key)
         return note_at(location, key, refused.sentence)

@@ -8,12 +8,11 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from common.config.refusal import NO_SUCH_KEY, faulty_path, keys_beside, sentence, unknown_key
+from common.config.refusal import NO_SUCH_KEY, faulty_path, keys_beside, sentence, without_consequences
 from common.config.yaml_locations import ConfigError, Located, location_at, note_at, parse_yaml
 from mission.console.option_checks import UserError
 from mission.scenario.parts.part import Key, KeyRefusal
 from mission.scenario.scenario import Scenario
-from mission.world.world_reader import without_consequences
 
 SUFFIX = ".scenario.yaml"
 READY = Path(__file__).parent / "ready"
@@ -125,11 +124,8 @@ def _sentence(error: ErrorDetails) -> str:
     raised = error.get("ctx", {}).get("error")
     if isinstance(raised, KeyRefusal):
         return raised.sentence
-    if error["type"] != "extra_forbidden":
-        return sentence(error, Scenario)
-    names = [name.removesuffix("_") for name in keys_beside(Scenario, error["loc"])]  # `from` is a word of Python's
-    text = unknown_key(str(error["loc"][-1]), names)
-    return f"{text}; there are {', '.join(names)}" if text == NO_SUCH_KEY else text
+    text = sentence(error, Scenario)
+    return f"{text}; there are {', '.join(keys_beside(Scenario, error['loc']))}" if text == NO_SUCH_KEY else text
 
 
 def resolve_paths(root: dict[str, Any], folder: Path) -> None:

@@ -19,7 +19,6 @@ from mission.console.option_checks import UserError
 from mission.console.terminal import print_line
 from mission.scenario.junit import junit_text
 from mission.scenario.keeping import keep_scenario, run_folder_of
-from mission.scenario.parts.part import KeyRefusal
 from mission.scenario.result import CheckResult, ScenarioResult
 from mission.scenario.runner import run_scenario
 from mission.scenario.scenario import Scenario
@@ -56,10 +55,8 @@ def fly(planned: Planned) -> Flown:
     try:
         folder = None if planned.keep is None else run_folder_of(planned.keep, planned.scenario, planned.seed)
         result = run_scenario(planned.scenario, planned.seed, folder=folder, file=planned.file)
-    except KeyRefusal as error:
-        return Flown(None, planned.scenario.refusal(error, planned.file))
     except UserError as error:
-        return Flown(None, f"{planned.file}: {error}")
+        return Flown(None, planned.scenario.refusal(error, planned.file))
     if folder is None:
         return Flown(result)
     if result.passed and not planned.keeps_all:

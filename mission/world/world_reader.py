@@ -1,13 +1,11 @@
 """A world file read: YAML into a `WorldFile`; what is wrong gets one sentence: file, line, key, what is allowed."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
-from pydantic_core import ErrorDetails
 
-from common.config.refusal import sentence
+from common.config.refusal import sentence, without_consequences
 from common.config.yaml_locations import ConfigError, Located, location_at, note_at, read_yaml
 from mission.console.option_checks import UserError
 
@@ -48,12 +46,6 @@ def read_and_build(file: Path) -> "tuple[WorldFile, WorldMap]":
         raise UserError(_at(root, first["loc"], said)) from error
     except WorldError as error:
         raise UserError(_at(root, error.loc, error.sentence)) from error
-
-
-def without_consequences(errors: Sequence[ErrorDetails]) -> list[ErrorDetails]:
-    """What pydantic found, without the keys that are missing only because they are spelled wrong."""
-    unknown = {each["loc"][:-1] for each in errors if each["type"] == "extra_forbidden"}
-    return [each for each in errors if each["type"] != "missing" or each["loc"][:-1] not in unknown]
 
 
 def _at(root: Located, loc: tuple[int | str, ...], said: str) -> str:

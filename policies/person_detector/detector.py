@@ -159,13 +159,18 @@ def _middle(scores: NDArray[np.float32], row: int, column: int) -> tuple[float, 
     )
 
 
+def _shown_m(depth: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """What bytes of the depth channel stand for [m]; inf: no return."""
+    byte = depth.astype(np.float64)
+    return np.where(byte < _NO_RETURN, depth_of(np.minimum(byte, _NO_RETURN - 1.0)), np.inf)
+
+
 def _on_body(depth: NDArray[np.uint8], range_m: float, at: tuple[float, float]) -> tuple[tuple[float, float], float]:
     """Where the body that depth shows about a pixel has its middle, and its range: of all pixels of that depth."""
     column, row = round(at[0]), round(at[1])
     columns = slice(max(column - _BODY_PX[0], 0), column + _BODY_PX[0])
     rows = slice(max(row - _BODY_PX[1], 0), row + _BODY_PX[1])
-    byte = depth[rows, columns].astype(np.float64)
-    shown_m = np.where(byte < _NO_RETURN, depth_of(np.minimum(byte, _NO_RETURN - 1.0)), np.inf)
+    shown_m = _shown_m(depth[rows, columns])
     is_body = np.abs(np.log(shown_m / range_m)) < _SAME_BODY
     if is_body.sum() < STRIDE:
         return at, range_m
@@ -192,12 +197,9 @@ def _chest_colours(pixels: NDArray[np.uint8], at: tuple[float, float], range_m: 
     aside, up, down = (max(m * per_m, 1.0) for m in _CHEST_M)
     columns = slice(max(round(at[0] - aside), 0), round(at[0] + aside))
     rows = slice(max(round(at[1] - up), 0), round(at[1] + down))
-    depth = pixels[rows, columns, 3].astype(np.float64)
     steps = (np.array(at) - 0.5 * width) * (2.0 * _HALF_WIDTH / width)
     skin_m = (range_m - _HALF_BODY_M) / sqrt(1.0 + float(steps @ steps))
-    is_body = (depth < _NO_RETURN) & (
-        np.abs(np.log(depth_of(np.minimum(depth, _NO_RETURN - 1.0)) / skin_m)) < _SAME_BODY
-    )
+    is_body = np.abs(np.log(_shown_m(pixels[rows, columns, 3]) / skin_m)) < _SAME_BODY
     chest = pixels[rows, columns, :3][is_body]
     if len(chest) == 0:
         return None

@@ -136,10 +136,8 @@ def check_scenario(scenario: Scenario, file: str) -> None:
         check_orders(scenario)
         check_faults(scenario, configs)
         check_starts(scenario, configs)
-    except KeyRefusal as error:
-        raise UserError(scenario.refusal(error, file)) from error
     except UserError as error:
-        raise UserError(f"{file}: {error}") from error
+        raise UserError(scenario.refusal(error, file)) from error
 
 
 def _own(base: FlightConfig, scenario: Scenario, vehicle: Vehicle, *, drives: bool) -> FlightConfig:

@@ -34,7 +34,7 @@ def judge(run: Run, histories: Sequence[History], end_s: float) -> tuple[CheckRe
 
 
 def _results(seen: Seen, check: c.Check) -> list[CheckResult]:
-    title = check.name or check.name_chosen.replace("_", " ")
+    title = check.title
     try:
         results = list(JUDGES[check.name_chosen](seen, check, check.chosen))
     except NothingToJudge as nothing:

@@ -279,6 +279,11 @@ class Check(OneOf):
     """Figures of the scorecard of FollowMe, as `honeyguide follow` shows them, each with its bounds."""
     interventions: Interventions | None = None
 
+    @property
+    def title(self) -> str:
+        """What its results are called, or begin with."""
+        return self.name or self.name_chosen.replace("_", " ")
+
     @model_validator(mode="after")
     def _looks_at_something(self) -> Self:
         if not isinstance(self.from_, str) and not isinstance(self.to, str):

@@ -15,6 +15,7 @@ _SCATTER_VAR = np.array([0.014, 0.040, 0.036])
 _APART = 2.2  # what is gained where there is no difference: people's means are so much farther apart, in logarithms,
 _MATCHES = 1.6  # and at most: one of five others may wear the same
 _DIFFERS = -4.0  # what is lost at most: light may have changed
+UNLIKE = -3.0  # likeness below which two look otherwise
 _SLOW = 0.5  # of the scatter is of light, which changes slowly
 _MEMORY = 8  # images
 _ENOUGH = 3  # images, before anything is said

@@ -14,7 +14,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from policies.companion.senses.looks import Looks, likeness
+from policies.companion.senses.looks import UNLIKE, Looks, likeness
 from policies.companion.senses.seen_owner import PersonNow
 
 Floats = NDArray[np.float64]
@@ -39,8 +39,7 @@ _HEARD = 2  # after so many reports
 _KNOWN = 8  # after so many the phone's noise is
 _NEXT_S = 1.6  # a report that comes later than this is not the next
 _STEADY = 0.1  # of each report: how soon a worse phone is noticed
-_UNLIKE = -3.0  # likeness of who looks otherwise: old reports count for them no more
-_ALIKE = 0.5  # and of who looks the same
+_ALIKE = 0.5  # likeness of who looks the same
 _CERTAIN = 6.0  # of reports, from which what somebody wears is what the owner wears
 _WEARS = 20  # reports, over which it is learned what the owner wears
 
@@ -217,7 +216,7 @@ class PhoneCheck:
             who.fit.odds = min(max(who.fit.odds, -_LEAST), _MOST)
         if owner is not None:
             least = -_MOST if self._usual.noise.steps >= _KNOWN else 0.0  # not doubted before
-            most = 0.0 if likeness(owner.looks, self._usual.looks) < _UNLIKE else _MOST
+            most = 0.0 if likeness(owner.looks, self._usual.looks) < UNLIKE else _MOST
             owner.fit.odds = min(max(owner.fit.odds, least), most)
         odds = [self._usual.odds(who) for who in others]
         best = max(range(len(others)), key=odds.__getitem__, default=-1)
@@ -251,7 +250,7 @@ class PhoneCheck:
 
         What was heard was of either of them then.
         """
-        if likeness(owner.looks, self._usual.looks) > _UNLIKE:
+        if likeness(owner.looks, self._usual.looks) > UNLIKE:
             return None
         alike = [likeness(who.looks, self._usual.looks) for who in others]
         best = max(range(len(others)), key=alike.__getitem__, default=-1)

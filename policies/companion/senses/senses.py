@@ -17,6 +17,7 @@ from common.image_stream import ImageFrame
 from policies.companion.observation import REPORT_LAG_S
 from policies.companion.owner_watch import OwnerWatch, sighting_from
 from policies.companion.senses.local_map import LocalMap, has_depth
+from policies.companion.senses.looks import UNLIKE
 from policies.companion.senses.other_people import OtherPeople
 from policies.companion.senses.phone_check import PhoneCheck, PhoneFit, Suitor, Word
 from policies.companion.senses.poses import Pose, PoseHistory
@@ -40,7 +41,6 @@ _STRANGE_S = 4.0  # and after so long anybody may be them
 _NEW_US = 1_000_000  # after so long with somebody in sight they are the owner, if nobody was so before
 _IN_A_ROW = 4  # as many images must show them, one beside the other
 _BESIDE_M = 1.0
-_UNLIKE = -3.0  # likeness from which somebody is not the owner where others are about
 
 
 class Senses:
@@ -209,7 +209,7 @@ class Senses:
             self._others.forget()
         gone_us = self.seen_us if is_gone else None
         left = self._others.left(sights, None if is_gone else expected, alike, pose, gone_us)
-        may_be = [k for k in left if alike[k] > _UNLIKE]
+        may_be = [k for k in left if alike[k] > UNLIKE]
         best = self._nearest(found, sights, may_be, expected, gate_m) if may_be else None
         strangers = [sights[k] for k in left if k != best]
         self._others.meet(strangers, None if best is None else sights[best].place_ned, pose)
