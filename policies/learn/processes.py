@@ -31,7 +31,7 @@ from policies.learn.training_run_folder import RunError
 HOST = "127.0.0.1"
 START_S = 300.0  # a process that imports torch and reads datasets on a busy machine is given
 ROUND_S = 3600.0  # the others wait while the first judges and writes
-_END_S = 5.0  # for a process whose connections are gone to be found dead
+_END_S = 30.0  # for a process whose connections are gone to be found dead; on a busy machine 5 were too few
 
 
 def check_processes(config: RunConfig) -> None:
