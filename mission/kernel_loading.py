@@ -29,6 +29,7 @@ _OWNER = (
     "policies.tasks.follow_me.image_way",
     "policies.tasks.follow_me.observe",
     "policies.tasks.flight.rollout",
+    "policies.tasks.follow_me.tracked.keep_off",
     "policies.tasks.follow_me.tracked.owner_filter",
     "policies.tasks.follow_me.tracked.vector",
     "policies.tasks.flight.own_state",

@@ -123,11 +123,12 @@ class PersonDetector:
 
 def peaks(scores: NDArray[np.float32], least: float) -> list[tuple[int, int]]:
     """Row and column of cells that score at least so much, and than which none within two cells scores more."""
-    padded = np.pad(scores, _APART, constant_values=-np.inf)
-    size, span = scores.shape[0], 2 * _APART + 1
-    beside = np.stack([padded[r : r + size, c : c + size] for r in range(span) for c in range(span)]).max(0)
-    rows, columns = np.nonzero((scores >= least) & (scores >= beside))
-    return list(zip(rows.tolist(), columns.tolist(), strict=True))
+    found = []
+    for row, column in np.argwhere(scores >= least).tolist():
+        beside = scores[max(row - _APART, 0) : row + _APART + 1, max(column - _APART, 0) : column + _APART + 1]
+        if scores[row, column] >= beside.max():
+            found.append((row, column))
+    return found
 
 
 def _checked_range(range_m: float, depth: NDArray[np.uint8], row: int, column: int) -> float | None:

@@ -21,7 +21,7 @@ from policies.companion.guard.limits import (
     way_along_m,
     within_heights,
 )
-from policies.companion.guard.rollouts import clear_velocity
+from policies.companion.guard.rollouts import Rollouts
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.ranges import Ranges
 from policies.companion.senses.local_map import LocalMap
@@ -63,6 +63,7 @@ class GoalGuard:
         update = {"brake": brake, "solid_m": settings.goal_solid_m}
         update |= dict.fromkeys(("reaction_s", "hears_s"), settings.goal_reaction_s)
         self.settings = settings.model_copy(update=update)
+        self._rollouts = Rollouts(self.settings)
         self._drives = drives
         self.stance = GoalStance.FREE
         self.interventions: Counter[str] = Counter()
@@ -131,7 +132,7 @@ class GoalGuard:
 
     def _bounded(self, level: Floats, down: float, yaw_rate: float, own: Own, age_s: float) -> Velocity:  # noqa: ARG002
         """The nearest velocity that can be flown and stopped in what is clear, between the ground and the crowns."""
-        kept = clear_velocity(level, self._flown, own, self._map, self.settings)
+        kept = self._rollouts.clear_velocity(level, self._flown, own, self._map)
         self._flown = kept
         self._count("near something", level, kept)
         if not self._drives:

@@ -10,18 +10,16 @@ from enum import Enum
 from math import atan2, inf, isfinite
 
 import numpy as np
-import warp as wp
 from numpy.typing import NDArray
 
 from common.attitude import wrapped, yaw_of
 from policies.companion.guard.limits import CLIMB_M_S, faded, stopping_speed, within_heights
-from policies.companion.guard.rollouts import Somebody, clear_velocity
+from policies.companion.guard.people import PeopleRule, Somebody
+from policies.companion.guard.rollouts import Rollouts
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
 from policies.companion.vehicle_link import NEVER_US, Own
-from policies.tasks.follow_me.tracked.keep_off import OVER_M, bounds, keep_off, kept_off
-from policies.tasks.follow_me.tracked.owner_filter import std_along
 
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
@@ -31,7 +29,6 @@ _SEARCH_FACES_S = 4.0  # then there from other sides, since trees may hide who i
 _SEARCH_ROUNDS_S = 13.0  # and then round itself
 _THERE_M = 2.0  # so near the stand-off it looks round
 _RISEN_US = 2_000_000  # for so long it stays over the owner
-_SILENCE_MAX_S = 60.0  # silence that is no number is so long
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 
 
@@ -56,7 +53,7 @@ class Guard:
     def __init__(self, settings: GuardSettings, senses: Senses) -> None:
         self.settings = settings
         self.senses = senses
-        self._keep_off = keep_off(settings.owner_m, settings.owner_brake, settings.reaction_s, settings.escape_climb)
+        self._people, self._rollouts = PeopleRule(settings), Rollouts(settings)
         self.stance = Stance.FREE
         self.interventions: Counter[str] = Counter()
         """How many decisions were changed, by the reason."""
@@ -165,25 +162,13 @@ class Guard:
 
     def _past_people(self, level: Floats, own: Own) -> tuple[Floats, list[Somebody]]:
         """The velocity without what brings it too near to anybody who was seen, and what it has to do with them."""
-        self._is_too_near, self._sinking_max = False, inf
         owner, people = self.senses.owner_now(own), self.senses.others_now(own)
-        kept, near = level, []
-        for known in people if owner is None else [owner, *people]:
-            way = known.pos_ned[:2] - np.array(own.pos_ned[:2])
-            over_m = float(known.pos_ned[2]) - own.pos_ned[2]
-            own_vel, vel = wp.vec2(*own.vel_ned[:2]), wp.vec2(*known.vel)
-            vel_std = std_along(wp.mat22(*known.vel_var.ravel()), wp.vec2(*way))
-            silence_s = min(known.silence_s, _SILENCE_MAX_S)
-            bound = bounds(self._keep_off, wp.vec2(*way), own_vel, vel, vel_std, silence_s, over_m)
-            self._is_too_near |= bound.then_m < self.settings.owner_m
-            self._sinking_max = min(self._sinking_max, bound.sinking_max)
-            if self.stance is Stance.SEARCH and over_m >= OVER_M:  # it keeps its height
-                continue
-            unit = way / max(float(np.hypot(*way)), 1e-3)
-            near.append(Somebody(unit, bound.closing_max, bound.then_m < self.settings.pressed_m))
-            kept = np.array(kept_off(wp.vec2(*kept), wp.vec2(*way), bound.closing_max))
+        everybody = people if owner is None else [owner, *people]
+        kept, near = self._people.bound(level, own, everybody, passes_over=self.stance is Stance.SEARCH)
+        self._is_too_near = any(person.then_m < self.settings.owner_m for person in near)
+        self._sinking_max = min((person.sinking_max for person in near), default=inf)
         self._count("near somebody", level, kept)
-        return kept, near
+        return kept, [person for person in near if not person.is_passed_over]
 
     def _past_solids(self, level: Floats, own: Own, people: list[Somebody]) -> Floats:
         s, around = self.settings, self.senses.map
@@ -191,7 +176,7 @@ class Guard:
         if not around.has_depth:
             slower = level * min(1.0, s.no_depth_speed / max(float(np.hypot(*level)), 1e-6))
             self._count("no depth", level, slower)
-        kept = clear_velocity(slower, self._flown, own, around, s, people)
+        kept = self._rollouts.clear_velocity(slower, self._flown, own, around, people)
         self._count("near something", slower, kept)
         return kept
 

@@ -6,7 +6,6 @@ to have. What is clear is so from the first sample to the last: whoever takes on
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.warp_start import start_warp
+from policies.companion.guard.people import Somebody
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.local_map import LocalMap
 from policies.companion.vehicle_link import Own
@@ -22,6 +22,7 @@ from policies.tasks.flight.rollout import roll
 Floats = NDArray[np.float64]
 _FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the speed that is wanted
 _TURNS = np.arange(-17, 19) * (np.pi / 18.0)
+_MOST = 256  # candidates
 _STEP_S, _STEPS = 0.05, 90  # coarser, it would pass over a trunk
 _NEARER_M = 0.1  # who is too near already may come so much nearer on the way out,
 _NEAREST_M = 0.1  # but by no more than this too near
@@ -32,56 +33,68 @@ _SLACK_M = 0.25  # so much, since the map, and how a vehicle answers, are known 
 _THAT_WAY = 0.5  # whoever turns by 60 degrees and more does not go there at all
 
 
-@dataclass(frozen=True)
-class Somebody:
-    """A person near the vehicle."""
-
-    way: Floats
-    """Unit, from the vehicle to them, north and east."""
-    closing_max: float
-    """[m/s] towards them; negative: it has to give way."""
-    is_pressing: bool
-    """So near that it rather goes back to where it has not looked than waits for them."""
-
-
-def clear_velocity(
-    wanted: Floats, last: Floats, own: Own, around: LocalMap, s: GuardSettings, people: Sequence[Somebody] = ()
-) -> Floats:
-    """The level velocity nearest to the wanted one [m/s] whose rollout is clear; if none is, the one farthest off.
+class Rollouts:
+    """Of one guard.
 
     Args:
-        wanted: north and east [m/s].
-        last: that was asked for last, and is being answered.
-        own: telemetry.
-        around: what is known.
         s: of the guard.
-        people: who are kept off besides; the wanted velocity does so, as far as it can be.
     """
-    here = np.array(own.pos_ned[:2])
-    here_m = float(around.room(here, own.pos_ned, own.boot_us)[0])
-    asked = _candidates(wanted, last, s.unseen_speed, is_too_near=here_m < s.solid_m)
-    near_m, is_seen = around.room(here + _rolled(asked, np.array(own.vel_ned[:2]), last, s), own.pos_ned, own.boot_us)
-    may_be_unseen = np.hypot(asked[:, 0], asked[:, 1]) <= s.unseen_speed + 1e-6
-    is_allowed = np.ones(len(asked), bool)
-    for person in people:
-        is_allowed &= asked @ person.way <= person.closing_max + 1e-6
-        if person.is_pressing:
-            may_be_unseen |= asked @ person.way < 0.0
-    is_blocked = (near_m < _room_m(here_m, s.solid_m)) | ~(is_seen | may_be_unseen[:, None])
-    is_clear = ~is_blocked.any(1)
-    answered = 1 + round(s.reaction_s / _STEP_S)
-    least_m = np.where(is_seen | may_be_unseen[:, None], near_m, 0.0)[:, answered:].min(1)
-    speed, wanted_speed = np.hypot(*asked.T), float(np.hypot(*wanted))
-    is_that_way = asked @ wanted > _THAT_WAY * speed * wanted_speed
-    slower = wanted_speed - np.where(is_that_way, np.minimum(speed, wanted_speed), 0.0)
-    cost = np.hypot(*(asked - wanted).T) + _STEADY * np.hypot(*(asked - last).T) + _SLOWER * slower
-    cost[0] = 0.0  # what is wanted, if it is clear
-    cost += _GRAZING * np.maximum(s.solid_m + _SLACK_M - least_m, 0.0)
-    if (is_clear & is_allowed).any():
-        return np.asarray(asked[int(np.argmin(np.where(is_clear & is_allowed, cost, np.inf)))])
-    if not is_allowed.any():  # between people
-        return np.zeros(2)
-    return np.asarray(asked[int(np.argmax(np.where(is_allowed, least_m - 1e-3 * speed, -np.inf)))])
+
+    def __init__(self, s: GuardSettings) -> None:
+        start_warp()
+        self._s = s
+        asked, now = wp.zeros(_MOST, dtype=wp.vec2), wp.zeros(2, dtype=wp.vec2)
+        way = wp.zeros((_MOST, _STEPS + 1), dtype=wp.vec2)
+        self._asked, self._now, self._way = asked.numpy(), now.numpy(), way.numpy()  # live views
+        hears_s = min(s.hears_s, s.reaction_s)
+        inputs = [asked, now, hears_s, s.reaction_s - hears_s, s.brake, s.solid_m, _STEP_S, way]
+        self._launch: Any = wp.launch(roll, _MOST, inputs, record_cmd=True)
+
+    def clear_velocity(
+        self, wanted: Floats, last: Floats, own: Own, around: LocalMap, people: Sequence[Somebody] = ()
+    ) -> Floats:
+        """The level velocity nearest to the wanted one [m/s] whose rollout is clear; if none is, the one farthest off.
+
+        Args:
+            wanted: north and east [m/s].
+            last: that was asked for last, and is being answered.
+            own: telemetry.
+            around: what is known.
+            people: who are kept off besides; the wanted velocity does so, as far as it can be.
+        """
+        s, here = self._s, np.array(own.pos_ned[:2])
+        clearance = around.clearance(own.pos_ned, own.boot_us)
+        here_m = float(clearance.at(here)[0])
+        asked = _candidates(wanted, last, s.unseen_speed, is_too_near=here_m < s.solid_m)
+        near_m, is_seen = clearance.at(here + self._rolled(asked, np.array(own.vel_ned[:2]), last))
+        may_be_unseen = np.hypot(asked[:, 0], asked[:, 1]) <= s.unseen_speed + 1e-6
+        is_allowed = np.ones(len(asked), bool)
+        for person in people:
+            is_allowed &= asked @ person.way <= person.closing_max + 1e-6
+            if person.then_m < s.pressed_m:
+                may_be_unseen |= asked @ person.way < 0.0
+        is_blocked = (near_m < _room_m(here_m, s.solid_m)) | ~(is_seen | may_be_unseen[:, None])
+        is_clear = ~is_blocked.any(1)
+        answered = 1 + round(s.reaction_s / _STEP_S)
+        least_m = np.where(is_seen | may_be_unseen[:, None], near_m, 0.0)[:, answered:].min(1)
+        speed, wanted_speed = np.hypot(*asked.T), float(np.hypot(*wanted))
+        is_that_way = asked @ wanted > _THAT_WAY * speed * wanted_speed
+        slower = wanted_speed - np.where(is_that_way, np.minimum(speed, wanted_speed), 0.0)
+        cost = np.hypot(*(asked - wanted).T) + _STEADY * np.hypot(*(asked - last).T) + _SLOWER * slower
+        cost[0] = 0.0  # what is wanted, if it is clear
+        cost += _GRAZING * np.maximum(s.solid_m + _SLACK_M - least_m, 0.0)
+        if (is_clear & is_allowed).any():
+            return np.asarray(asked[int(np.argmin(np.where(is_clear & is_allowed, cost, np.inf)))])
+        if not is_allowed.any():  # between people
+            return np.zeros(2)
+        return np.asarray(asked[int(np.argmax(np.where(is_allowed, least_m - 1e-3 * speed, -np.inf)))])
+
+    def _rolled(self, asked: Floats, own: Floats, last: Floats) -> Floats:
+        """Where each candidate leads from here [m], and so far ahead; shape (candidates, _STEPS + 1, 2)."""
+        self._asked[: len(asked)] = asked
+        self._now[:] = own, last
+        self._launch.launch()
+        return np.asarray(self._way[: len(asked)], np.float64)
 
 
 def _room_m(here_m: float, solid_m: float) -> float:
@@ -102,13 +115,3 @@ def _candidates(wanted: Floats, last: Floats, unseen_speed: float, *, is_too_nea
     away = unseen_speed * np.stack([cos, sin], -1)[: None if is_too_near else 0]
     before = last * min(1.0, speed / max(float(np.hypot(*last)), 1e-6))
     return np.concatenate([wanted[None], before[None], slower, away, np.zeros((1, 2))])
-
-
-def _rolled(asked: Floats, own: Floats, last: Floats, s: GuardSettings) -> Floats:
-    """Where each candidate leads from here [m], and so far ahead of it; shape (candidates, _STEPS + 1, 2)."""
-    start_warp()
-    way = wp.zeros((len(asked), _STEPS + 1), dtype=wp.vec2)
-    hears_s = min(s.hears_s, s.reaction_s)
-    inputs: list[Any] = [wp.array(asked, dtype=wp.vec2), wp.vec2(*own), wp.vec2(*last), hears_s]
-    wp.launch(roll, len(asked), [*inputs, s.reaction_s - hears_s, s.brake, s.solid_m, _STEP_S, way])
-    return np.asarray(way.numpy(), np.float64)

@@ -4,6 +4,7 @@ In: depth pictures or sectors of ranges, with the pose each was taken at. Out: h
 What has not been seen is not free.
 """
 
+from dataclasses import dataclass
 from math import hypot, inf
 
 import cv2
@@ -39,6 +40,22 @@ _FAN_UNITS = np.stack([np.cos((np.arange(_FAN) + 0.5) * _FAN_RAD), np.sin((np.ar
 _RAYS = 5  # of a sector of ranges: a cell apart at the edge of what is asked for
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance:
+    """What was known at a time, over the cells of the grid."""
+
+    near_m: Floats
+    """To the middle of the nearest solid cell; farther than ROOM_M is told as that."""
+    is_seen: NDArray[np.bool_]
+    """Was seen to be free not long ago."""
+
+    def at(self, points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """Both of some places; shapes as of the points, without their last axis."""
+        rows, columns = cells_of(points.reshape(-1, 2))
+        shape = points.shape[:-1]
+        return self.near_m[rows, columns].reshape(shape), self.is_seen[rows, columns].reshape(shape)
 
 
 class LocalMap:
@@ -105,12 +122,12 @@ class LocalMap:
             self._open_ahead(*owner, now_us)
         level, far_m = points[..., :2][is_solid], level_m[is_solid][:, None]
         behind = level * (1.0 + _THICK_M / np.maximum(far_m, _THICK_M))
-        rows, columns = self._cells(np.concatenate([level, behind]) + here)
+        rows, columns = cells_of(np.concatenate([level, behind]) + here)
         self._solid_us[rows, columns] = now_us
 
     def _look_up(self, points: Floats, now_us: int) -> None:
         """Notes what lies overhead, ned."""
-        rows, columns = self._cells(points[:, :2])
+        rows, columns = cells_of(points[:, :2])
         old = self._over_us[rows, columns] <= now_us - _HOLD_US
         self._over[rows[old], columns[old]] = -np.inf
         np.maximum.at(self._over, (rows, columns), points[:, 2])
@@ -118,7 +135,7 @@ class LocalMap:
 
     def room_up_m(self, pos_ned: Vector, now_us: int) -> float:
         """How far up it is [m] to the lowest of what was seen over where the vehicle is; inf: to nothing."""
-        rows, columns = self._cells(np.array(pos_ned[:2]) + self._own)
+        rows, columns = cells_of(np.array(pos_ned[:2]) + self._own)
         over = np.where(self._over_us[rows, columns] > now_us - _HOLD_US, self._over[rows, columns], -np.inf)
         over = over[over < pos_ned[2]]
         return pos_ned[2] - float(over.max()) if len(over) else inf
@@ -145,7 +162,7 @@ class LocalMap:
         As wide as they keep off trees: from the vehicle they hide more than themselves.
         """
         along = np.arange(0.0, _LEAD_S + 0.04, 0.04)[:, None, None] * velocity[:2]
-        rows, columns = self._cells((place[:2] + along + self._person).reshape(-1, 2))
+        rows, columns = cells_of((place[:2] + along + self._person).reshape(-1, 2))
         is_open = self._solid_us[rows, columns] <= now_us - _SOLID_US
         self._free_us[rows[is_open], columns[is_open]] = now_us
 
@@ -172,7 +189,7 @@ class LocalMap:
         self.has_depth = bool(is_return.any())
         self._open(here, units, np.where(is_return, far_m - CELL_M, REACH_M), now_us)
         is_near = is_return & (far_m < REACH_M)
-        rows, columns = self._cells(here + far_m[is_near, None] * units[is_near])
+        rows, columns = cells_of(here + far_m[is_near, None] * units[is_near])
         self._solid_us[rows, columns] = now_us
 
     def _open(self, here: Floats, units: Floats, free_m: Floats, now_us: int) -> None:
@@ -180,9 +197,9 @@ class LocalMap:
         steps = np.arange(0.0, REACH_M, 0.8 * CELL_M)
         points = here + units[:, None] * steps[None, :, None]
         for seen in (points[steps[None] < free_m[:, None]], here + self._hull):
-            rows, columns = self._cells(seen)
+            rows, columns = cells_of(seen)
             self._free_us[rows, columns] = now_us
-        rows, columns = self._cells(here + self._own)
+        rows, columns = cells_of(here + self._own)
         is_solid = self._solid_us[rows, columns] > now_us - _SOLID_US
         self._free_us[rows[~is_solid], columns[~is_solid]] = now_us
 
@@ -197,11 +214,8 @@ class LocalMap:
         for start in (here - aside, here, here + aside):
             self._open(start, unit[None], np.array([far_m]), now_us)
 
-    def room(self, points: Floats, pos_ned: Vector, now_us: int) -> tuple[Floats, NDArray[np.bool_]]:
-        """How far the nearest solid cell's middle is from each of some places [m], and where it was seen to be free.
-
-        Farther than ROOM_M is told as that; shapes as of the points, without their last axis.
-        """
+    def clearance(self, pos_ned: Vector, now_us: int) -> Clearance:
+        """What is known of places round a vehicle by now."""
         self._follow(pos_ned)
         then = now_us - _HOLD_US
         is_open = (self._solid_us <= now_us - _SOLID_US) | (self._solid_us < self._free_us)
@@ -209,10 +223,7 @@ class LocalMap:
         unrolled = np.roll(is_open, first, (0, 1)).astype(np.uint8)
         near = CELL_M * cv2.distanceTransform(unrolled, cv2.DIST_L2, cv2.DIST_MASK_PRECISE).astype(np.float64)
         near = np.roll(np.minimum(near, ROOM_M), [-by for by in first], (0, 1))
-        rows, columns = self._cells(points.reshape(-1, 2))
-        shape = points.shape[:-1]
-        is_seen = (self._free_us > then)[rows, columns]
-        return near[rows, columns].reshape(shape), is_seen.reshape(shape)
+        return Clearance(near, self._free_us > then)
 
     def nearest_m(self, pos_ned: Vector, yaw_rad: float, now_us: int) -> Floats:
         """How near anything known to be solid is in each of SECTORS sectors from the heading clockwise [m]."""
@@ -232,10 +243,6 @@ class LocalMap:
         np.minimum.at(out, sectors, np.maximum(far_m - 0.5 * CELL_M, 0.0))
         return out
 
-    def _cells(self, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        cells = np.floor(points / CELL_M).astype(np.int64)
-        return cells[:, 0] % CELLS, cells[:, 1] % CELLS
-
     def _follow(self, pos_ned: Vector) -> None:
         """Forgets what has come to lie outside."""
         corner = tuple(int(np.floor(x / CELL_M)) - CELLS // 2 for x in pos_ned[:2])
@@ -248,6 +255,12 @@ class LocalMap:
             for grid in (self._free_us, self._solid_us, self._over_us):
                 np.moveaxis(grid, axis, 0)[lines] = _UNSEEN
         self._corner = (corner[0], corner[1])
+
+
+def cells_of(points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows and columns of places, (n, 2), in a grid that moves along."""
+    cells = np.floor(points / CELL_M).astype(np.int64)
+    return cells[:, 0] % CELLS, cells[:, 1] % CELLS
 
 
 def has_depth(depth: NDArray[np.uint8]) -> bool:

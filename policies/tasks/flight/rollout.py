@@ -11,8 +11,7 @@ wp.set_module_options({"enable_backward": False})
 @wp.kernel(enable_backward=False)
 def roll(
     asked: wp.array(dtype=wp.vec2),
-    own: wp.vec2,
-    last: wp.vec2,
+    now: wp.array(dtype=wp.vec2),
     hears_s: float,
     lag_s: float,
     brake: float,
@@ -24,8 +23,7 @@ def roll(
 
     Args:
         asked: [m/s], (velocities,).
-        own: the vehicle's own [m/s].
-        last: asked for before, and answered until the new one is heard [m/s].
+        now: the vehicle's own [m/s], and what was asked for before and is answered until the new one is heard [m/s].
         hears_s: until then.
         lag_s: of the answer.
         brake: [m/s²] by which its velocity changes at most.
@@ -35,13 +33,13 @@ def roll(
     """
     i = wp.tid()
     unit = asked[i] / wp.max(wp.length(asked[i]), 1.0e-6)
-    velocity = own
+    velocity = now[0]
     place = wp.vec2(0.0, 0.0)
     changed_s = float(-1.0)  # when it has the velocity that it is asked for
     for k in range(way.shape[1] - 1):
         time_s = (float(k) + 0.5) * step_s
         done = float(0.0)
-        wanted = last
+        wanted = now[1]
         if time_s >= hears_s:
             if changed_s < 0.0:
                 changed_s = hears_s + lag_s + wp.length(asked[i] - velocity) / brake

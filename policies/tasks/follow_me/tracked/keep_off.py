@@ -2,13 +2,15 @@
 
 Whatever they do from when they were seen on (stop, turn, set off at the vehicle), it can stand before it is too near:
 the safe distance of responsibility-sensitive safety (Shalev-Shwartz et al. 2017, arXiv 1708.06374), with late pictures.
-Whoever goes away gives room as far as that speed is sure; whoever comes is given way to. One source: a guard calls
-these functions from Python, training in kernels.
+Whoever goes away gives room as far as that speed is sure; whoever comes is given way to. One source: a guard asks
+`keep_off_all`, training its functions.
 """
 
 from typing import Any
 
 import warp as wp
+
+from policies.tasks.follow_me.tracked.owner_filter import std_along
 
 wp.set_module_options({"enable_backward": False})
 
@@ -147,3 +149,44 @@ def bounds(
     b.then_m = distance_then(way, own_vel, other_vel, k.reaction_s, age_s)
     b.sinking_max = sinking_max(k, over_m, b.then_m, age_s)
     return b
+
+
+@wp.struct
+class Person:
+    """Somebody near a vehicle, as they are known by now."""
+
+    way: wp.vec2  # [m] to them
+    vel: wp.vec2  # [m/s]
+    vel_var: wp.mat22  # [m²/s²]
+    age_s: float  # since they were seen
+    over_m: float  # how far the vehicle is above their chest
+
+
+@wp.struct
+class Asked:
+    """What one vehicle wants, near so many."""
+
+    level: wp.vec2  # [m/s]
+    own_vel: wp.vec2  # [m/s]
+    people: int
+    passes_over: wp.bool  # it keeps its height, and who is far enough below is in nobody's way
+
+
+@wp.kernel(enable_backward=False)
+def keep_off_all(
+    k: KeepOff,
+    asked: wp.array(dtype=Asked),
+    people: wp.array(dtype=Person),
+    kept: wp.array(dtype=wp.vec2),
+    out: wp.array(dtype=Bounds),
+) -> None:
+    """The level velocity of one vehicle without what is too fast towards any of some people, and the bounds of each."""
+    a = asked[0]
+    level = a.level
+    for i in range(a.people):
+        p = people[i]
+        b = bounds(k, p.way, a.own_vel, p.vel, std_along(p.vel_var, p.way), p.age_s, p.over_m)
+        out[i] = b
+        if not (a.passes_over and p.over_m >= OVER_M):
+            level = kept_off(level, p.way, b.closing_max)
+    kept[0] = level

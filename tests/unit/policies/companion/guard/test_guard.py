@@ -93,7 +93,7 @@ def test_an_owner_who_runs_is_no_obstacle_in_late_images(scene: tuple[Guard, Own
         pixels[:, 30:34, 3] = int(255.0 * far_m / (far_m + float(DEPTH_HALF_M)))  # their body
         guard.senses.sense(own, Owner(), ImageFrame(taken_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M)))
     north = np.stack([np.arange(0.5, 9.0, 0.25), np.zeros(34)], -1)  # where they run
-    room_m, _ = guard.senses.map.room(north, own.pos_ned, own.boot_us)
+    room_m, _ = guard.senses.map.clearance(own.pos_ned, own.boot_us).at(north)
     assert (room_m > 0.5).all()
 
 

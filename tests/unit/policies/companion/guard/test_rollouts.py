@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from policies.companion.guard.rollouts import Somebody, clear_velocity
+from policies.companion.guard.people import Somebody
+from policies.companion.guard.rollouts import Rollouts
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.local_map import CELL_M, LocalMap
 from policies.companion.senses.poses import Pose
@@ -37,27 +38,27 @@ def own_at(pos: np.ndarray, vel: np.ndarray) -> Own:
 
 def test_what_is_clear_is_flown_as_wanted() -> None:
     wanted = np.array([3.0, -2.0])
-    kept = clear_velocity(wanted, wanted, own_at(np.zeros(2), wanted), around(None, np.zeros(2)), S)
+    kept = Rollouts(S).clear_velocity(wanted, wanted, own_at(np.zeros(2), wanted), around(None, np.zeros(2)))
     assert kept == pytest.approx(wanted)
 
 
 def test_where_nothing_has_been_seen_it_creeps() -> None:
     still = np.zeros(2)
-    kept = clear_velocity(np.array([3.0, 0.0]), still, own_at(still, still), LocalMap(), S)
+    kept = Rollouts(S).clear_velocity(np.array([3.0, 0.0]), still, own_at(still, still), LocalMap())
     assert 0.3 < float(np.hypot(*kept)) <= S.unseen_speed + 1e-6
 
 
 def test_who_is_pressed_goes_back_to_where_it_has_not_looked() -> None:
     back, still = np.array([-2.0, 0.0]), np.zeros(2)
-    pressing = [Somebody(np.array([1.0, 0.0]), -2.0, is_pressing=True)]
-    kept = clear_velocity(back, still, own_at(still, still), LocalMap(), S, pressing)
+    pressing = [Somebody(np.array([1.0, 0.0]), -2.0, 1.0, 0.0)]
+    kept = Rollouts(S).clear_velocity(back, still, own_at(still, still), LocalMap(), pressing)
     assert kept == pytest.approx(back)
 
 
 def test_who_can_go_round_a_trunk_does_so_at_speed() -> None:
     """Slower and slower towards it, it would be left behind by whom it follows."""
     wanted, pos = np.array([4.0, 0.0]), np.zeros(2)
-    kept = clear_velocity(wanted, wanted, own_at(pos, wanted), around((4.4, 0.1), pos), S)
+    kept = Rollouts(S).clear_velocity(wanted, wanted, own_at(pos, wanted), around((4.4, 0.1), pos))
     assert abs(float(kept[1])) > 0.5
     assert float(np.hypot(*kept)) == pytest.approx(4.0, abs=0.01)
 
@@ -68,11 +69,13 @@ def test_who_flies_at_a_trunk_goes_round_it_or_stands_and_never_nearer_to_somebo
     rng = np.random.default_rng(seed)
     trunk, step_s = (float(rng.uniform(1.5, 8.0)), float(rng.uniform(-1.0, 1.0))), 0.1
     speed, closing_max, angle = rng.uniform(1.0, 6.0), rng.uniform(0.0, 3.0), rng.uniform(0.0, 6.2)
-    person = Somebody(np.array([np.cos(angle), np.sin(angle)]), max(closing_max, speed * float(np.cos(angle))), False)
+    person = Somebody(
+        np.array([np.cos(angle), np.sin(angle)]), max(closing_max, speed * float(np.cos(angle))), 9.0, 0.0
+    )
     wanted, pos, vel = np.array([speed, 0.0]), np.zeros(2), np.zeros(2)
-    asked, lag_s = [np.zeros(2)], S.reaction_s - step_s
+    rollouts, asked, lag_s = Rollouts(S), [np.zeros(2)], S.reaction_s - step_s
     for _ in range(60):
-        asked.append(clear_velocity(wanted, asked[-1], own_at(pos, vel), around(trunk, pos), S, [person]))
+        asked.append(rollouts.clear_velocity(wanted, asked[-1], own_at(pos, vel), around(trunk, pos), [person]))
         assert float(asked[-1] @ person.way) <= person.closing_max + 1e-5
         change = asked.pop(0) - vel
         vel = vel + change * min(step_s / lag_s, S.brake * step_s / max(float(np.hypot(*change)), 1e-6))

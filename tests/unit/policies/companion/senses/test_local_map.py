@@ -24,7 +24,7 @@ def picture(depth_m: float | None) -> np.ndarray:
 def way_m(seen: LocalMap, pos_ned: Vector, way: tuple[float, float], now_us: int = 0) -> tuple[float, float]:
     """How far it was seen to be free from a place in a direction, and how far nothing solid is nearer than 0.3 m."""
     along_m = np.arange(0.0, 9.5, 0.5 * CELL_M)
-    room_m, is_seen = seen.room(np.array(pos_ned[:2]) + along_m[:, None] * np.array(way), pos_ned, now_us)
+    room_m, is_seen = seen.clearance(pos_ned, now_us).at(np.array(pos_ned[:2]) + along_m[:, None] * np.array(way))
     is_clear = room_m > 0.3
     free_m, known_m = (
         float(along_m[max(int(np.argmin([*ok, False])) - 1, 0)]) for ok in (is_seen & is_clear, is_clear)
@@ -75,7 +75,7 @@ def test_where_the_owner_runs_is_free_as_wide_as_they_keep_off_trees() -> None:
     seen.see(picture(2.0), POSE, (np.add(HERE, (2.0, 0.0, 0.0)), np.array([4.0, 0.0])), 0)
     for aside_m, is_free in ((0.4, True), (-0.4, True), (1.0, False), (-1.0, False)):
         beside = np.add(HERE[:2], (4.0, aside_m))
-        assert seen.room(beside[None], HERE, 0)[1][0] == is_free
+        assert seen.clearance(HERE, 0).at(beside)[1] == is_free
 
 
 def test_without_returns_there_is_no_depth_and_only_the_line_to_whom_it_sees_is_free() -> None:
