@@ -30,9 +30,11 @@ DECISION_US = 100_000
 DECISION_EARLY_US = 50_000  # an image may come this much earlier than the decision period asks
 DECISION_LATE_US = 50_000  # and is waited for this much longer
 IMAGE_OLD_US = 500_000  # guess: five images missed, 3 m at full speed
+IMAGE_EARLY_US = 500_000  # telemetry may be so much later than an image; of a later stamp nobody knows the age
 GUARDED_OLD_US = 2_500_000  # the guard stands still before
 OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
 NO_IMAGES = "no new pictures"
+OTHER_CLOCK = "pictures from the future"
 LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the images that policies are trained on
 STANDING = (Stance.STOP, Stance.SEARCH, Stance.BLIND)
 LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view
@@ -92,6 +94,7 @@ class Following:
         self._image: ImageFrame | None = None  # the newest
         self._image_us = -1  # when it came in, on our clock; -1: never
         self._decided_us = -DECISION_US  # when was decided last, on our clock
+        self._is_early = False  # the newest image was stamped later than now, and left out
         self._is_new = False  # there is an image that was not decided on
         self._has_looked = False  # at the newest image
         self._is_tracked = False  # the tracker has been told of it
@@ -106,11 +109,10 @@ class Following:
 
     def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
         self._owner = vehicle.owner
-        image = self.camera.take(time_us)
+        image = self._taken(vehicle, time_us)
         if image is not None:
             self._image, self._image_us, self._is_new = image, time_us, True
             self._has_looked = self._is_tracked = False
-            vehicle.clock.pictured(image.time_us)
         if self._senses is not None:
             self._senses.sense(vehicle.own, self._owner, image if self._is_fit(image) else None)
         if self._recorder is not None:
@@ -126,13 +128,21 @@ class Following:
         image = self._image
         old_us = GUARDED_OLD_US if self.guard is not None and self._is_flying else IMAGE_OLD_US
         if image is None or max(time_us - self._image_us, own.boot_us - image.time_us) > old_us:
-            return NO_IMAGES  # none came in, or what came in was old
+            return OTHER_CLOCK if self._is_early else NO_IMAGES  # none came in, or what came in was old
         if image.pixels.shape != self._pilot.image_shape:
             return "pictures of another size"
         lens = (image.hfov_deg, image.pitch_deg, image.depth_half_m)
         if not all(isclose(here, there, rel_tol=LENS_TOLERANCE) for here, there in zip(lens, LENS, strict=True)):
             return "pictures of another lens"
         return ""
+
+    def _taken(self, vehicle: VehicleLink, time_us: int) -> ImageFrame | None:
+        """A new image; one from the future is none."""
+        image = self.camera.take(time_us)
+        if image is not None:
+            vehicle.clock.pictured(image.time_us)
+            self._is_early = image.time_us - vehicle.own.boot_us > IMAGE_EARLY_US
+        return None if self._is_early else image
 
     def _is_fit(self, image: ImageFrame | None) -> bool:
         """Whether there is a picture, of the size that the pilot needs."""

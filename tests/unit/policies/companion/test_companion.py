@@ -10,7 +10,7 @@ from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from common.image_stream import ImageFrame
 from policies.companion.companion import MISFIT, NO_DECISION, NOT_ALONE, Companion
 from policies.companion.engagement import Phase
-from policies.companion.skills.following import IMAGE_OLD_US, LENS, NO_IMAGES, Following
+from policies.companion.skills.following import IMAGE_OLD_US, LENS, NO_IMAGES, OTHER_CLOCK, Following
 from policies.companion.vehicle_link import COMPONENT
 from policies.experts.follower import ScriptedFollower
 
@@ -135,6 +135,32 @@ def test_pictures_taken_long_ago_are_none_even_if_they_come_in_now(age_us, is_ta
     air.run(1.0)
     assert (air.companion.trouble != NO_IMAGES) is is_taken
     assert (air.companion.phase is Phase.FLYING) is is_taken
+
+
+@pytest.mark.parametrize("ahead_us", [3_000_000, 600_000_000])
+def test_pictures_of_a_clock_that_has_jumped_ahead_are_not_flown_by(ahead_us):
+    air = flown_air()
+    air.images.age_us = -ahead_us
+    reported = air.run(1.0)
+    assert air.companion.trouble == OTHER_CLOCK
+    assert air.companion.phase is Phase.HANDING_BACK
+    assert f"Companion: hold: {OTHER_CLOCK}" in [m.fields.text for m in reported if m.name == "STATUSTEXT"]
+
+
+def test_pictures_that_telemetry_is_somewhat_later_than_are_flown_by():
+    air = flown_air()
+    air.images.age_us = -300_000
+    air.run(1.0)
+    assert air.companion.phase is Phase.FLYING
+
+
+def test_one_picture_from_the_future_is_left_out():
+    air = flown_air()
+    air.images.age_us = -3_000_000
+    air.run(0.15)
+    air.images.age_us = 0
+    air.run(4.0)
+    assert air.companion.phase is Phase.FLYING
 
 
 def test_a_policy_that_flies_is_not_given_a_rover():
