@@ -28,6 +28,8 @@ def fly_scenarios(
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes at a time. Default: one per core.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write JUnit XML.")] = None,
     keep: Annotated[Path | None, typer.Option(help="Folder where runs that fail are kept, with logs.")] = None,
+    keep_all: Annotated[bool, typer.Option("--keep-all", help="Keep those that pass, too.")] = False,
+    mcap: Annotated[bool, typer.Option("--mcap", help="Kept runs have flight.mcap too, for Foxglove.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Show what failed only.")] = False,
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON schema of scenario files, and end.")] = False,
 ) -> None:
@@ -42,6 +44,10 @@ def fly_scenarios(
     try:
         from mission.scenario.scenario_file import READY, ScenarioFile, find_files, read_scenario
 
+        if keep is None and (keep_all or mcap):
+            raise UserError(f"test: {'--keep-all' if keep_all else '--mcap'} needs --keep FOLDER")
+        if mcap and find_spec("foxglove") is None:
+            raise UserError("--mcap: comes with the extra 'foxglove' (docs/start/installing.md)")
         if not paths and not ready:
             raise UserError("test: name scenario files or folders, or add --ready")
         files = find_files([*(paths or ()), *([READY] if ready else [])])
@@ -57,7 +63,7 @@ def fly_scenarios(
                 for file in scenarios:
                     check_scenario(file.scenario, str(file.path))
             planned = [
-                Planned(file.scenario, str(file.path), seed, keep)
+                Planned(file.scenario, str(file.path), seed, keep, keeps_all=keep_all, has_mcap=mcap)
                 for file in scenarios
                 for seed in chosen or file.scenario.seeds
             ]

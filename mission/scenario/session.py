@@ -37,6 +37,8 @@ class Planned:
     """Folder for the runs that fail."""
     keeps_all: bool = False
     """And for those that pass."""
+    has_mcap: bool = False
+    """Those that are kept have an MCAP file beside each log."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,11 @@ def fly(planned: Planned) -> Flown:
     if result.passed and not planned.keeps_all:
         shutil.rmtree(folder)
         return Flown(replace(result, folder="", ulogs=(), tlogs=()))
+    if planned.has_mcap:
+        from mission.foxglove.convert import convert
+
+        for ulog in map(Path, result.ulogs):
+            convert(ulog, ulog.with_suffix(".mcap"))
     return Flown(result, command=keep_scenario(folder, planned.scenario, planned.seed))
 
 

@@ -64,9 +64,19 @@ def test_a_passing_run_is_not_kept(folder):
     assert not list((folder / "kept").iterdir())
 
 
+def test_a_passing_run_is_kept_if_asked_for_and_for_foxglove_too(folder):
+    pytest.importorskip("foxglove")
+    kept = folder / "kept"
+    result = run(folder, "--seeds", 1, "--jobs", 1, "--keep", kept, "--keep-all", "--mcap", "--quiet")
+    assert result.exit_code == 0, result.output
+    assert (kept / "hop-seed1" / "flight.mcap").read_bytes().startswith(b"\x89MCAP0\r\n")
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
+        (["--keep-all"], "test: --keep-all needs --keep FOLDER"),
+        (["--mcap"], "test: --mcap needs --keep FOLDER"),
         (["--seeds", "1,x"], "--seeds 1,x: must be whole numbers from 0"),
         (["--junit", "/nowhere/junit.xml"], "--junit /nowhere/junit.xml: no such folder"),
         (["missing"], "missing: no such file or folder"),
