@@ -31,6 +31,7 @@ CMD_CHANGE_SPEED = 178
 CMD_REPOSITION = 192
 CMD_MISSION_START = 300
 CMD_ARM_DISARM = 400
+CMD_RUN_PREARM_CHECKS = 401
 
 MAIN_AUTO = 4
 MAIN_OFFBOARD = 6
@@ -55,6 +56,7 @@ FREE_YAW_RATE = 1 << 11
 FREE_BODY_RATES = 0b111
 FREE_ATTITUDE = 1 << 7
 
+_SAYS_S = 0.5  # until it has said why it may not be armed
 SENSOR_PREARM = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK
 
 
@@ -128,8 +130,26 @@ class Drone(Client):
     # -- actions ----------------------------------------------------------------------------------------------------
 
     async def wait_ready(self, timeout_s: float = 60.0) -> None:
-        """Returns when the vehicle may be armed and knows its home."""
-        await self.until(lambda: self.is_ready, timeout_s, "ready to arm")
+        """Returns when the vehicle may be armed and knows its home.
+
+        Raises:
+            ScriptTimeout: it may not in time; it says why not.
+        """
+        try:
+            await self.until(lambda: self.is_ready, timeout_s, "ready to arm")
+        except ScriptTimeout as timeout:
+            reasons = await self._reasons_against_arming()
+            raise ScriptTimeout(": ".join([str(timeout), *reasons])) from timeout
+
+    async def _reasons_against_arming(self) -> list[str]:
+        """What it says when it is asked, in one line; nothing if it does not."""
+        heard = len(self.texts)
+        try:
+            await self.command(CMD_RUN_PREARM_CHECKS, name="arming checks")
+        except ScriptError:
+            return []
+        await self.sleep(_SAYS_S)
+        return [", ".join(text.removeprefix("PreArm: ") for text in self.texts[heard:])] if self.texts[heard:] else []
 
     async def arm(self, *, force: bool = False) -> None:
         if not self.is_armed and self.px4_mode in ((MAIN_AUTO, AUTO_RTL), (MAIN_AUTO, AUTO_LAND)):

@@ -28,7 +28,10 @@ def fly(run: Run, vehicle: VehicleRun) -> Steps:
         ScriptError: a step failed; the message says which.
     """
     state = vehicle.flight.controller.state
-    yield from _until(vehicle, lambda: state.is_ready_to_arm and state.home is not None, READY_S, "ready to arm")
+    try:
+        yield from _until(vehicle, lambda: state.is_ready_to_arm and state.home is not None, READY_S, "ready to arm")
+    except ScriptError as error:
+        raise ScriptError(": ".join([str(error), ", ".join(vehicle.flight.controller.check_arming())])) from error
     for number, step in enumerate(vehicle.config.script, 1):
         try:
             yield from STEPS[step.name_chosen](run, vehicle, step.chosen)

@@ -19,7 +19,14 @@ from mission.fleet.fleet_options import Member
 from mission.fleet.roster import fleet_configs
 from mission.flight import Flight
 from mission.flight_config import AIRFIELD, TREELESS_M, FlightConfig, OwnerConfig
-from mission.scenario.flight.checking import airframe_of, check_faults, check_orders, check_parameters, check_starts
+from mission.scenario.flight.checking import (
+    airframe_of,
+    check_faults,
+    check_orders,
+    check_parameters,
+    check_purpose,
+    check_starts,
+)
 from mission.scenario.parts.part import KeyRefusal
 from mission.scenario.scenario import Scenario, Vehicle, World
 from mission.simulator.flight_rig import flight_world
@@ -136,6 +143,7 @@ def check_scenario(scenario: Scenario, file: str) -> None:
         check_orders(scenario)
         check_faults(scenario, configs)
         check_starts(scenario, configs)
+        check_purpose(scenario)
     except UserError as error:
         raise UserError(scenario.refusal(error, file)) from error
 

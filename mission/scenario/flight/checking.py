@@ -90,6 +90,22 @@ def check_orders(scenario: Scenario) -> None:
             _check_policy(vehicle, (*key, "policy"))
 
 
+def check_purpose(scenario: Scenario) -> None:
+    """Refuses what would pass whatever happens.
+
+    Raises:
+        KeyRefusal: nothing is to be flown, and nothing is checked.
+    """
+    if not (scenario.checks or scenario.faults or any(_is_told(vehicle) for vehicle in scenario.fleet)):
+        raise KeyRefusal(
+            scenario.fleet_keys[0], "is told nothing and nothing is checked: give it a script, or add checks"
+        )
+
+
+def _is_told(vehicle: Vehicle) -> bool:
+    return bool(vehicle.script or vehicle.plan or vehicle.python or vehicle.policy)
+
+
 def _check_plan(file: Path, key: Key) -> None:
     if not file.is_file():
         raise KeyRefusal(key, f"{file}: no such file")

@@ -229,6 +229,11 @@ def test_several_vehicles_are_judged_one_by_one_and_together(tmp_path):
     assert len(result.ulogs) == 3
 
 
+def test_who_never_becomes_ready_says_why():
+    result = flown(["arm"], vehicle={"start": {"battery": 0.05}})
+    assert result.error == "ready to arm: nothing within 60 s: battery: 5% left, 15% needed"
+
+
 def test_a_motor_that_is_not_there_is_refused():
     with pytest.raises(UserError, match="x500 has motors 1 to 4, not 7"):
         flown(faults=[{"at": 1, "motor": {"number": 7}}])

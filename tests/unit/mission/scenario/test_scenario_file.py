@@ -208,6 +208,9 @@ def test_names_are_those_of_the_parts_that_do_it():
     assert set(WORLD_KINDS) < set(get_args(WorldName))
 
 
+AT_REST = "checks: [{at_end: {is_armed: false}}]\n"
+
+
 def refused(text, tmp_path):
     """The sentence with which a file that can be read is refused before it is flown."""
     with pytest.raises(UserError) as refusal:
@@ -236,6 +239,10 @@ def refused(text, tmp_path):
             "3: vehicle.parameters.NAV_DLL_ACT: 99 is not between",
         ),
         ("vehicle:\n  throw_m_s: 10\n", "2: vehicle.throw_m_s: airframe 'x500': only a plane can be thrown"),
+        (
+            "vehicle:\n  airframe: f450\n",
+            "1: vehicle: is told nothing and nothing is checked: give it a script, or add",
+        ),
         ("vehicle:\n  plan: no.plan\n", "2: vehicle.plan: no.plan: no such file"),
         ("vehicle:\n  plan: hop.py\n", "2: vehicle.plan: hop.py: "),
         (
@@ -308,8 +315,8 @@ def test_what_cannot_be_flown_is_refused_before_with_its_place(tmp_path, text, s
         "vehicle: {airframe: rover, python: 'hop.py:sail'}\nfaults: [{at: 1, sensor: {name: wheels, mode: stuck}}]\n",
         "vehicle: {airframe: f550, python: 'hop.py:made'}\nfaults: [{at: 1, motor: {number: 6}}]\n",
         "has_ground_station: true\nfaults: [{at: 1, link: ground_station}]\n",
-        "vehicles: [{start: {ne_m: [5, 5]}}, {start: {ne_m: [5, 6]}}]\nworld: {size_m: 50}\n",
-        "vehicle: {start: {ne_m: [100, -100]}}\nworld: {size_m: 200}\n",
+        "vehicles: [{start: {ne_m: [5, 5]}}, {start: {ne_m: [5, 6]}}]\nworld: {size_m: 50}\n" + AT_REST,
+        "vehicle: {start: {ne_m: [100, -100]}}\nworld: {size_m: 200}\n" + AT_REST,
         "checks: [{altitude: {min: 5, max: 5}}]\n",
     ],
 )
