@@ -40,7 +40,7 @@ def prepared_flight(item: pytest.Function, choice: Mapping[str, Any]) -> TestedF
     place = f"{item.nodeid}: @pytest.mark.honeyguide"
     with refused(place):
         scenario, seed = scenario_of(item, choice)
-        check_scenario(scenario, place)
+        check_scenario(scenario, place, is_whole=False)
         flight = _flight(item, scenario, seed)
     item.stash[_FLIGHT] = flight
     return flight

@@ -31,7 +31,8 @@ def fly(run: Run, vehicle: VehicleRun) -> Steps:
     try:
         yield from _until(vehicle, lambda: state.is_ready_to_arm and state.home is not None, READY_S, "ready to arm")
     except ScriptError as error:
-        raise ScriptError(": ".join([str(error), ", ".join(vehicle.flight.controller.check_arming())])) from error
+        reasons = ", ".join(vehicle.flight.controller.check_arming())
+        raise ScriptError(": ".join(filter(None, (str(error), reasons)))) from error
     for number, step in enumerate(vehicle.config.script, 1):
         try:
             yield from STEPS[step.name_chosen](run, vehicle, step.chosen)

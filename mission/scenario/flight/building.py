@@ -127,12 +127,13 @@ def flight_configs(scenario: Scenario, seed: int) -> list[FlightConfig]:
     return own if len(own) == 1 else _placed(base, scenario, own)
 
 
-def check_scenario(scenario: Scenario, file: str) -> None:
+def check_scenario(scenario: Scenario, file: str, *, is_whole: bool = True) -> None:
     """Refuses what can be seen to be wrong before anything is flown.
 
     Args:
         scenario: what is to be flown.
         file: how refusals call a scenario that was read from no file; others have file and line of the key.
+        is_whole: nobody tells the vehicles anything besides.
 
     Raises:
         UserError: an airframe, parameter, plan, policy or function is not there, a fault is of a part that is not
@@ -143,7 +144,8 @@ def check_scenario(scenario: Scenario, file: str) -> None:
         check_orders(scenario)
         check_faults(scenario, configs)
         check_starts(scenario, configs)
-        check_purpose(scenario)
+        if is_whole:
+            check_purpose(scenario)
     except UserError as error:
         raise UserError(scenario.refusal(error, file)) from error
 
