@@ -12,10 +12,11 @@ from mission.follow.benchmark.conditions import BY_NAME, CONDITIONS
 from mission.follow.benchmark.flights import Outcome, _has_resumed, _has_stood, _is_kept, fly
 from mission.follow.benchmark.pilots import any_pilot
 from policies.companion.guard.settings import GuardSettings
+from policies.companion.names import FOLLOWER
 from policies.companion.pilot import PilotError
 from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.follow_me.flown_cast import params_row
-from policies.tasks.follow_me.observe import EGO
+from policies.tasks.follow_me.observe import EGO, TRACKED
 
 
 class FullSpeedAhead:
@@ -107,11 +108,61 @@ def test_what_fell_short_is_named():
     assert len(misses("follow", {"walk": [good, bad]})) == 2
 
 
+class Both:
+    """Flies by the first, and asks the second of the same."""
+
+    def __init__(self, first, second):
+        self._pilots, self.apart = (first, second), []
+        self.kind, self.image_shape, self.owner_hfrd = first.kind, first.image_shape, None
+
+    def reset(self):
+        for pilot in self._pilots:
+            pilot.reset()
+
+    def act(self, vector, image):
+        first, second = (pilot.act(vector, image) for pilot in self._pilots)
+        self.apart.append(np.abs(first - second).max())
+        return first
+
+
+def exported_to(path, policy):
+    result = CliRunner().invoke(app, ["export", str(policy), str(path)])
+    assert result.exit_code == 0, result.output
+    return str(path)
+
+
+def test_the_exported_policy_that_ships_decides_in_flight_as_it_does_itself(tmp_path):
+    exported = any_pilot(exported_to(tmp_path / "policy.onnx", FOLLOWER))
+    assert exported.kind == int(TRACKED)
+    pilots = Both(any_pilot(FOLLOWER), exported)
+    outcome = fly(pilots, BY_NAME["walk"], 2_000_003, GuardSettings(), seconds=3.0)
+    assert outcome.ended_s == pytest.approx(3.0, abs=0.2)
+    assert len(pilots.apart) > 25
+    assert max(pilots.apart) < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("policy", "takes"),
+    [
+        ("navigate", "takes obs_0 [batch, 138], and gives [batch, 4]; "),
+        ("follow-me-teacher", "takes obs_0 [batch, 53], and gives [batch, 4]; "),
+        ("parking1", "takes obs_0 [batch, "),
+    ],
+)
+def test_an_exported_policy_of_something_else_is_refused_in_a_sentence(tmp_path, policy, takes):
+    path = exported_to(tmp_path / "policy.onnx", policy)
+    result = honeyguide("follow", "--policy", path, "--condition", "walk")
+    assert result.exit_code == 2
+    wants = "a vector of 21 or 13 floats and an image of 64 x 64 x 4, or frames of 55 floats and no image"
+    assert f"{path}: {takes}" in " ".join(result.stderr.split())
+    assert wants in " ".join(result.stderr.split())
+    assert "Traceback" not in result.stderr
+
+
 def test_an_exported_policy_chooses_what_the_policy_itself_does(tmp_path):
     """By onnxruntime, with its memory, over some seconds of images that differ."""
-    exported = CliRunner().invoke(app, ["export", str(pretrained("FollowMe")), str(tmp_path / "policy.onnx")])
-    assert exported.exit_code == 0, exported.output
-    own, theirs = any_pilot("follow-me"), any_pilot(str(tmp_path / "policy.onnx"))
+    exported = exported_to(tmp_path / "policy.onnx", pretrained("FollowMe"))
+    own, theirs = any_pilot("follow-me"), any_pilot(exported)
     rng = np.random.default_rng(1)
     for _ in range(20):
         vector = rng.normal(0.0, 0.5, 21).astype(np.float32)
