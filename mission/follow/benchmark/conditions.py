@@ -10,6 +10,9 @@ if TYPE_CHECKING:
 _HIDES = {"owner_hides_per_min": 1.0}
 _SILENT = {"phone_dropouts_per_min": 20.0, "phone_dropout_scale": 1e4}
 _FOR_GOOD_S = 1e4
+LEAST_KEPT, LEAST_STOOD, LEAST_RESUMED = 0.95, 0.95, 0.9
+"""[1] of the flights of any condition, of those that it can be said of: that kept the owner, that stood in
+time after the last sight, and that followed again in time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,10 +28,14 @@ class Condition:
     """[1] of the time; None: the owner cannot be followed all the time."""
     least_m: float | None = None
     """[m] never nearer to the owner's chest while they are hidden; None: not asked for."""
+    most_accel: float | None = None
+    """[m/s²] RMS, of the vehicle, level; None: not asked for."""
+    most_yaw_rate: float | None = None
+    """[deg/s] RMS; None: not asked for."""
 
 
 CONDITIONS = (
-    Condition("walk", "standard, walking", "walk", {}, 0.98),
+    Condition("walk", "standard, walking", "walk", {}, 0.98, most_accel=0.8, most_yaw_rate=12.0),
     Condition("run", "standard, running", "run", {}, 0.95),
     Condition("silent", "the phone silent, running", "run", _SILENT, 0.95),
     Condition("late-100", "pictures 100 ms late", "run", {"image_lag_s": 0.1}, 0.95),

@@ -1,6 +1,7 @@
 """`honeyguide benchmark follow`: any policy flies through a condition, and what came of it is shown and written."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,7 +68,11 @@ def test_a_flight_is_shown_and_written(tmp_path):
     record = json.loads((out / "flights.json").read_text())
     (outcome,) = record["flights"]["walk"]
     assert 0.0 <= outcome["in_band"] <= 1.0
-    assert "standard, walking" in (out / "table.md").read_text()
+    table = (out / "table.md").read_text()
+    assert "standard, walking" in table
+    missed = [line.removeprefix("miss: ") for line in result.output.splitlines() if line.startswith("miss: ")]
+    assert bool(missed) == bool(result.exit_code)
+    assert all(f"- {text}\n" in table for text in missed)
 
 
 def test_the_guard_keeps_a_policy_that_flies_at_its_owner_off_them():
@@ -101,11 +106,56 @@ def test_an_owner_is_kept_who_was_not_lost_for_long():
     assert _is_kept((away > 90) & (away < 140), (away < 50) | (away > 180), 0.1)
 
 
+GOOD = Outcome(1, 0.99, False, False, 1.5, float("nan"), None, None, True, 0.0, 0.7, 11.0, 60.0, "")
+
+
+def missed(condition, *outcomes):
+    return misses("follow", {condition: list(outcomes)})
+
+
 def test_what_fell_short_is_named():
-    good = Outcome(1, 0.99, False, False, 1.5, float("nan"), None, None, True, 0.0, 1.0, 10.0, 60.0, "")
-    bad = Outcome(3, 0.5, True, True, 0.4, float("nan"), None, None, False, 0.0, 1.0, 10.0, 20.0, "")
-    assert misses("follow", {"walk": [good]}) == []
-    assert len(misses("follow", {"walk": [good, bad]})) == 2
+    bad = replace(GOOD, in_band=0.5, is_collided=True, is_somebody_hit=True, is_kept=False)
+    assert missed("walk", GOOD) == []
+    assert missed("walk", GOOD, bad) == [
+        "standard, walking: 74.5% of the time in the band, wanted 98%",
+        "standard, walking: 1 of 2 flights touched somebody or something, 1 of them somebody",
+        "standard, walking: 1 of 2 flights kept the owner, wanted 95%",
+    ]
+
+
+def test_who_follows_calmly_enough_behind_a_runner_may_be_too_abrupt_behind_a_walker():
+    abrupt = replace(GOOD, accel_rms=0.8, yaw_rate_rms=15.7)
+    assert missed("run", abrupt) == []
+    assert missed("walk", abrupt) == [
+        "standard, walking: accelerates by 0.80 m/s² RMS, wanted less than 0.8",
+        "standard, walking: turns by 15.7 deg/s RMS, wanted less than 12",
+    ]
+    assert missed("walk", abrupt, replace(GOOD, accel_rms=0.7, yaw_rate_rms=8.0)) == []  # on the mean
+
+
+@pytest.mark.parametrize(
+    ("name", "least", "sentence"),
+    [
+        ("has_stood", 0.95, "flights stood 5 s after the last sight, wanted 95%"),
+        ("has_resumed", 0.9, "flights followed again within 10 s of a return, wanted 90%"),
+        ("is_kept", 0.95, "flights kept the owner, wanted 95%"),
+    ],
+)
+def test_what_is_wanted_of_most_flights_may_fail_in_few(name, least, sentence):
+    was, was_not = replace(GOOD, **{name: True}), replace(GOOD, **{name: False})
+    few = round(20 * (1.0 - least))
+    assert missed("gone-8", *[was_not] * few, *[was] * (20 - few)) == []
+    title, count = BY_NAME["gone-8"].title, 20 - few - 1
+    assert missed("gone-8", *[was_not] * (few + 1), *[was] * count) == [f"{title}: {count} of 20 {sentence}"]
+
+
+def test_of_flights_in_which_nobody_hid_no_standing_is_asked():
+    assert missed("gone-8", replace(GOOD, has_stood=None, has_resumed=None)) == []
+
+
+def test_a_hidden_owner_is_not_come_near():
+    text = "owner not to be seen for 8 s: 1.49 m from a hidden owner, wanted 1.5"
+    assert missed("gone-8", GOOD, replace(GOOD, nearest_hidden_m=1.49)) == [text]
 
 
 class Both:
