@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from common.airframe import load_airframe
 from mission.benchmark.session import misses
 from mission.cli import app
 from mission.follow.benchmark.conditions import BY_NAME, CONDITIONS
-from mission.follow.benchmark.flights import Outcome, _has_resumed, _has_stood, _is_kept, fly
+from mission.follow.benchmark.flights import Outcome, _has_resumed, _has_stood, _is_kept, flight_of, fly
 from mission.follow.benchmark.pilots import any_pilot
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.names import FOLLOWER
 from policies.companion.pilot import PilotError
 from policies.pretrained.pretrained_policies import pretrained
-from policies.tasks.follow_me.flown_cast import params_row
+from policies.tasks.follow_me.follow_me_params import FOLLOW_PARAMS
 from policies.tasks.follow_me.observe import EGO, TRACKED
 
 
@@ -55,9 +56,21 @@ def test_what_is_wrong_is_refused_in_a_sentence(words, sentence):
     assert sentence in result.stderr
 
 
-def test_every_condition_is_of_numbers_that_there_are():
+def test_every_condition_is_of_numbers_that_there_are_within_their_bounds():
+    bounds = {number.name: (number.minimum, number.maximum) for number in FOLLOW_PARAMS}
     for condition in CONDITIONS:
-        params_row(condition.numbers)
+        for name, value in condition.numbers.items():
+            assert bounds[name][0] <= value <= bounds[name][1], condition.name
+        load_airframe(condition.airframe)
+
+
+def test_conditions_can_be_told_apart():
+    assert len(BY_NAME) == len({condition.title for condition in CONDITIONS}) == len(CONDITIONS)
+
+
+def test_a_condition_sets_wind_and_airframe():
+    flights = [flight_of(BY_NAME[name], 2_000_003) for name in ("walk", "wind", "f550")]
+    assert [(each.wind_m_s, each.airframe) for each in flights] == [(2.0, "x500"), (10.0, "x500"), (2.0, "f550")]
 
 
 def test_a_flight_is_shown_and_written(tmp_path):
