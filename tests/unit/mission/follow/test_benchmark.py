@@ -94,6 +94,14 @@ def test_the_guard_keeps_a_policy_that_flies_at_its_owner_off_them():
     assert outcome.interventions_per_min > 100.0
 
 
+def test_the_policy_that_ships_stands_while_its_owner_is_not_to_be_seen():
+    """Minutes of harder conditions: tests/system/companion/test_harder_conditions.py."""
+    outcome = fly(any_pilot(FOLLOWER), BY_NAME["gone-8"], 2_000_007, GuardSettings(), seconds=12.0)  # hidden from 5.5 s
+    assert outcome.has_stood
+    assert not outcome.is_collided
+    assert outcome.nearest_hidden_m > 1.5
+
+
 def test_a_class_of_ones_own_flies():
     assert any_pilot(f"{__name__}:FullSpeedAhead").owner_hfrd is None
     with pytest.raises(PilotError):
