@@ -18,6 +18,7 @@ from autopilot.mavlink.transport.links import LinkError
 from common.clock import Pacer, wall_time_s
 from mission.console.terminal import print_line
 from mission.dataset.companion_log import COMPANION_LOG, CompanionLog
+from mission.follow.guard_report import guard_text
 from policies.companion.companion import MISFIT, Companion
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import CameraUrlError
@@ -83,7 +84,7 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
         companion.close()
         if recording is not None:
             recording.close()
-    return f"{companion.decision_count} decisions; {latency_text(companion)}"
+    return f"{guard_text(companion)}; {latency_text(companion)}"
 
 
 def _recording(companion: Companion, options: CompanionOptions, console: Console) -> CompanionLog | None:

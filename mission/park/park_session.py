@@ -27,6 +27,7 @@ from mission.flight_config import FlightConfig
 from mission.flight_options import flight_config
 from mission.flight_session import FlightSession
 from mission.flight_settings import ParkOptions
+from mission.follow.guard_report import guard_figures, guard_text
 from mission.follow.lockstep import flight_with_driver
 from mission.kernel_loading import PARKING, load_kernels
 from mission.park.parking import Arrival, drive, get_ready
@@ -111,7 +112,8 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
     session.fly(_end(options, running), running)
     running.cancel()
     if spot is not None:
-        _report(spot, arrivals, running, session, console)
+        _report(spot, arrivals, running, companion, session, console)
+    print_line(console, guard_text(companion))
     print_line(console, f"logs: {folder}")
     session.close()
     is_good = spot is None or (bool(arrivals) and arrivals[0].is_there)
@@ -129,14 +131,22 @@ def _end(options: ParkOptions, running: Running) -> Callable[[FlightBase], bool]
     return is_over
 
 
-def _report(spot: Spot, arrivals: list[Arrival], running: Running, session: FlightSession, console: Console) -> None:
+def _report(
+    spot: Spot,
+    arrivals: list[Arrival],
+    running: Running,
+    companion: Companion,
+    session: FlightSession,
+    console: Console,
+) -> None:
     """Shows and writes how it ended."""
     if not arrivals:
         print_line(console, f"result: {running.error}")
         return
     console.print(_table(spot, arrivals[0]))
     with session.files.writing("summary.json") as path:
-        write_whole(path, (json.dumps({"spot": spot.number} | asdict(arrivals[0]), indent=2) + "\n").encode())
+        summary = {"spot": spot.number} | asdict(arrivals[0]) | guard_figures(companion)
+        write_whole(path, (json.dumps(summary, indent=2) + "\n").encode())
 
 
 def chosen_spot(spots: list[Spot], options: ParkOptions) -> Spot | None:

@@ -26,6 +26,10 @@ def test_it_follows_lands_and_writes_scorecard_and_recording(tmp_path):
     assert "scorecard" in result.output
     summary = json.loads((folder / "summary.json").read_text(), parse_constant=pytest.fail)  # no NaN: strict readers
     assert summary["in_band"] is not None
+    guard = summary["guard"]
+    assert guard["decisions"] >= 50
+    assert guard["changed_per_min"].keys() == guard["changed"].keys()
+    assert f"{guard['decisions']} decisions; the guard changed" in result.output
     assert "picture to setpoint" in result.output
     assert "logs and scorecard: " in result.output
     recording = load_recording(folder)

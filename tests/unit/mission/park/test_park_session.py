@@ -20,6 +20,7 @@ def test_a_rover_parks_in_a_free_spot_and_says_so(tmp_path):
     assert summary["outcome"] == "there"
     assert summary["distance_m"] < 0.3
     assert summary["turn_deg"] < 10.0
+    assert summary["guard"]["decisions"] > 20
     assert (tmp_path / "run" / "flight.ulg").stat().st_size > 10_000
 
 
