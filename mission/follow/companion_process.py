@@ -42,9 +42,9 @@ class CompanionOptions:
     camera: str
     is_reported: bool
     seconds: float | None
+    guard: GuardSettings
     is_by_sticks: bool = False
     follows: bool = False
-    has_guard: bool = True
     record: Path | None = None
 
 
@@ -61,7 +61,7 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
             options.camera,
             is_ordered_by_goto=options.is_reported,
             follows=options.follows,
-            guard=GuardSettings(is_on=options.has_guard),
+            guard=options.guard,
         )
         if options.is_by_sticks and not skill.drives:
             raise CompanionError(f"--by-sticks: {options.policy} flies, and only what drives is driven by sticks")

@@ -25,6 +25,7 @@ from mission.boards.board_options import check_board, commands_of
 from mission.boards.board_runs import run_of
 from mission.boards.board_session import station_links
 from mission.connections import open_foxglove, open_links, open_page
+from mission.console.guard_options import guard_of
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
 from mission.dataset.recording import record_flight
@@ -45,7 +46,6 @@ from mission.view.film import write_film
 from mission.view.replay_file import RecordingError, load_recording
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
-from policies.companion.guard.settings import GuardSettings
 from policies.companion.names import FOLLOWER, SCRIPTED
 from policies.companion.pilot import PilotError
 from policies.companion.skills.following import Pilot
@@ -75,6 +75,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     """The flight, with what must be held until its end."""
     console = Console()
     speed = speed_of(options.speed)
+    guard = guard_of(options.has_guard, options.guard_settings)
     pilot, name = chosen_pilot(options)
     config = follow_config(options, has_scanner=isinstance(pilot, NavigationPilot))
     foxglove, links = open_foxglove(options, held), _links(options, config, speed)
@@ -95,7 +96,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
             folder=folder,
             wall_s=wall_time_s,
             make_flight=make_flight,
-            guard=GuardSettings(is_on=options.has_guard),
+            guard=guard,
         )
     if options.is_recorded:
         held.callback(record_flight(flight, companion, folder, options.policy or name).close)
@@ -124,13 +125,18 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         print_line(console, f"result: {trouble}")
     is_down = not trouble and not flight.is_crashed
     exit_code = finish(watch, companion, session.files, console, is_down=is_down, is_stopped=is_stopped)
-    if flight.is_crashed:
-        print_line(console, "the vehicle crashed" + (f" ({', '.join(watch.takeovers)})" if watch.takeovers else ""))
-    print_line(console, f"{guard_text(companion)}\n{latency_text(companion)}")
+    _show_flown(flight, watch, companion, console)
     has_film = options.has_film and filmed(flight, folder, console)
     print_line(console, f"{'logs, scorecard and film' if has_film else 'logs and scorecard'}: {folder}")
     session.close()
     return exit_code
+
+
+def _show_flown(flight: FlightBase, watch: FollowWatch, companion: Companion, console: Console) -> None:
+    """Whether it crashed, what the guard has changed, and how long decisions took."""
+    if flight.is_crashed:
+        print_line(console, "the vehicle crashed" + (f" ({', '.join(watch.takeovers)})" if watch.takeovers else ""))
+    print_line(console, f"{guard_text(companion)}\n{latency_text(companion)}")
 
 
 def _links(options: FollowOptions, config: FlightConfig, speed: float | None) -> list[LinkSource]:

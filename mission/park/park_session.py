@@ -18,6 +18,7 @@ from common.airframe import load_airframe
 from common.files import write_whole
 from mission.client import Running
 from mission.connections import open_foxglove, open_links, open_page
+from mission.console.guard_options import guard_of
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
 from mission.dataset.recording import record_flight
@@ -37,7 +38,6 @@ from mission.simulator.flight_rig import flight_world
 from mission.view.pose_goals import Pose, PoseGoals
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
-from policies.companion.guard.settings import GuardSettings
 from policies.companion.pilot import PilotError
 from policies.companion.skills.driving import Driving
 from policies.companion.vector_pilot import DrivingPilot
@@ -76,6 +76,7 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
     console = Console()
     speed = speed_of(options.speed)
     config = park_config(options)
+    guard = guard_of(options.has_guard, options.guard_settings)
     pilot = _pilot(options.policy)
     with busy(console, "loading kernels") as say:
         has_camera = options.has_view or options.has_mcap or options.has_foxglove
@@ -88,7 +89,6 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
         raise UserError(str(error)) from error
     page = open_page(options.view_port) if options.has_view else None
     folder = held.enter_context(run_folder(options.run_folder))
-    guard = GuardSettings(is_on=options.has_guard)
     flight, companion = flight_with_driver(config, pilot, links=links, folder=folder, guard=guard)
     if options.is_recorded:
         record_flight(flight, companion, folder, options.policy)
