@@ -131,6 +131,11 @@ class GuardSettings(BaseModel):
     hull_room_m: float = Field(default=0.02, ge=0.0, le=5.0)
     """It comes no nearer to anything with its hull."""
 
+    @property
+    def changed(self) -> dict[str, float]:
+        """The numbers that are not as they ship."""
+        return self.model_dump(exclude={"is_on"}, exclude_defaults=True)
+
     @model_validator(mode="after")
     def _rises(self) -> Self:
         for low, high in _RISING:
