@@ -8,8 +8,8 @@ from rich.console import Console
 
 from mission.benchmark.benchmark import FIRST_SEED, TASKS
 from mission.console.command_refusal import learn_extra, refuse
+from mission.console.guard_options import GUARD_SETTING, guard_of
 from mission.console.terminal import loading
-from mission.flight_settings import GUARD_SETTING
 
 
 def benchmark(
@@ -36,7 +36,6 @@ def benchmark(
         with loading(Console()):
             from mission.benchmark.benchmark import benchmark_of
             from mission.benchmark.session import BenchmarkOptions, benchmark_session, misses
-            from mission.console.guard_options import guard_of
             from mission.console.option_checks import UserError
             from policies.companion.pilot import PilotError
 

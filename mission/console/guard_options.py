@@ -1,14 +1,16 @@
-"""`--guard`, `--no-guard` and `--guard-setting NAME=VALUE` of the commands that fly a policy."""
+"""`--guard`, `--no-guard` and `--guard-setting NAME=VALUE` of the commands that fly a policy. Light to import."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from mission.console.option_checks import UserError
-from policies.companion.guard.settings import GuardSettingError, GuardSettings, guard_settings
+if TYPE_CHECKING:
+    from policies.companion.guard.settings import GuardSettings
 
 FLAG = "--guard-setting"
+GUARD_SETTING = "Sets a number of the guard: NAME=VALUE (docs/reference/guard-settings.md). Repeatable."
 
 
-def guard_of(has_guard: bool, given: Sequence[str]) -> GuardSettings:
+def guard_of(has_guard: bool, given: Sequence[str]) -> "GuardSettings":
     """The guard that the options ask for.
 
     Args:
@@ -18,6 +20,9 @@ def guard_of(has_guard: bool, given: Sequence[str]) -> GuardSettings:
     Raises:
         UserError: no such setting, or a value that it cannot have.
     """
+    from mission.console.option_checks import UserError
+    from policies.companion.guard.settings import GuardSettingError, GuardSettings, guard_settings
+
     if given and not has_guard:
         raise UserError(f"{FLAG} and --no-guard: choose one")
     if not has_guard:

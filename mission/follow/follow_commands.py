@@ -8,9 +8,9 @@ import typer
 from rich.console import Console
 
 from mission.console.command_refusal import learn_extra, refuse
+from mission.console.guard_options import GUARD_SETTING, guard_of
 from mission.console.name_checks import check_policy
 from mission.console.terminal import loading
-from mission.flight_settings import GUARD_SETTING
 
 if TYPE_CHECKING:
     from mission.flight_settings import FollowOptions
@@ -61,7 +61,6 @@ def companion(
         if policy != "scripted":
             check_policy(policy)
         with loading(Console()):
-            from mission.console.guard_options import guard_of
             from mission.console.option_checks import UserError
             from mission.follow.companion_process import CompanionError, CompanionOptions, run_companion
 
