@@ -24,11 +24,10 @@ from policies.companion.senses.poses import Pose, PoseHistory
 from policies.companion.senses.seen_owner import PersonNow, SeenOwner, Sight
 from policies.companion.vehicle_link import Own, Owner
 from policies.mono_depth.network import MonoDepth
-from policies.person_detector.detector import Detection, PersonDetector
+from policies.person_detector.detector import SURE, Detection, PersonDetector
 
 Floats = NDArray[np.float64]
 PHONE_OLD_S = 3.0
-_SURE = 0.7  # probability from which the detector's word counts
 _GATE_M = 1.0  # from where the owner is expected by sights; who is farther off is somebody else,
 _GATE_M_S = 2.5  # and wider by so much with each second without a sight,
 _GATE_MAX_M = 8.0
@@ -104,7 +103,7 @@ class Senses:
         found = self._detector.find(pixels, (down[0], down[1]))
         if by_colours is not None:
             found = [replace(detection, has_depth=False) for detection in found]
-        found = [detection for detection in found if detection.probability >= _SURE]
+        found = [detection for detection in found if detection.probability >= SURE]
         seen = self._owner_among(found, pose)
         sighting = None if seen is None else sighting_from(seen.chest_hfrd, pose.pos_ned, pose.q_ned_from_frd)
         self.watch.take(image.time_us, own.boot_us, owner, sighting)
