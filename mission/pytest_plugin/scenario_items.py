@@ -38,13 +38,15 @@ class ScenarioItem(pytest.Item):
         self._scenario, self._seed = scenario, seed
 
     def runtest(self) -> None:
-        from mission.scenario.session import Planned, failure_lines, fly
+        from mission.scenario.keeping import run_folder_of
+        from mission.scenario.one_run import Planned, failure_lines, fly
 
         if self.config.getoption("link"):
             pytest.skip("scenario files are flown in simulation, not over --link")
         keep: Path | None = self.config.getoption("honeyguide_keep")
+        folder = None if keep is None else run_folder_of(keep, self._scenario, self._seed)
         planned = Planned(
-            self._scenario, str(self.path), self._seed, keep, keeps_all=self.config.getoption("honeyguide_keep_all")
+            self._scenario, str(self.path), self._seed, folder, keeps_all=self.config.getoption("honeyguide_keep_all")
         )
         flown = fly(planned)
         if flown.refusal or flown.result is None:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from mission.scenario.scenario_file import ScenarioFile
 
 SEED_MAX = 2**31 - 1
+RUN_MAX_S = 1800.0  # wall clock: ten minutes of many vehicles or of a policy take minutes
 
 
 def fly_scenarios(
@@ -26,6 +27,9 @@ def fly_scenarios(
         str | None, typer.Option(help="Fly each with these, as 1,2,3. Default: those of the scenario.")
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes at a time. Default: one per core.")] = None,
+    run_max: Annotated[
+        float, typer.Option(min=1.0, help="A run that takes longer [s, wall clock] hangs, and has failed.")
+    ] = RUN_MAX_S,
     junit: Annotated[Path | None, typer.Option(help="Write JUnit XML.")] = None,
     keep: Annotated[Path | None, typer.Option(help="Folder where runs that fail are kept, with logs.")] = None,
     keep_all: Annotated[bool, typer.Option("--keep-all", help="Keep those that pass, too.")] = False,
@@ -58,16 +62,14 @@ def fly_scenarios(
         with learn_extra():
             with loading(Console(stderr=True)):
                 from mission.scenario.flight.building import check_scenario
-                from mission.scenario.session import Planned, scenario_session
+                from mission.scenario.one_run import planned_runs
+                from mission.scenario.session import scenario_session
 
                 for file in scenarios:
                     check_scenario(file.scenario, str(file.path))
-            planned = [
-                Planned(file.scenario, str(file.path), seed, keep, keeps_all=keep_all, has_mcap=mcap)
-                for file in scenarios
-                for seed in chosen or file.scenario.seeds
-            ]
-            code = scenario_session(planned, jobs or len(os.sched_getaffinity(0)), junit=junit, is_quiet=quiet)
+            planned = planned_runs(scenarios, chosen, keep, keeps_all=keep_all, has_mcap=mcap)
+            count = jobs or len(os.sched_getaffinity(0))
+            code = scenario_session(planned, count, run_max, junit=junit, is_quiet=quiet)
     except UserError as error:
         refuse(str(error))
     raise typer.Exit(code)

@@ -18,12 +18,8 @@ COPIED = (".plan", ".waypoints", ".toml", ".py")
 
 
 def run_folder_of(keep: Path, scenario: Scenario, seed: int) -> Path:
-    """Where a run is kept, empty.
-
-    Raises:
-        UserError: something else is there.
-    """
-    return emptied(keep / f"{scenario.name}-seed{seed}")
+    """Where a run is kept."""
+    return keep / f"{scenario.name}-seed{seed}"
 
 
 def emptied(folder: Path) -> Path:

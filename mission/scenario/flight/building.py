@@ -19,6 +19,7 @@ from mission.fleet.fleet_options import Member
 from mission.fleet.roster import fleet_configs
 from mission.flight import Flight
 from mission.flight_config import AIRFIELD, TREELESS_M, FlightConfig, OwnerConfig
+from mission.kernel_loading import load_kernels
 from mission.scenario.flight.checking import (
     airframe_of,
     check_faults,
@@ -106,6 +107,30 @@ def flight_configs(scenario: Scenario, seed: int) -> list[FlightConfig]:
     Raises:
         KeyRefusal: an airframe, a parameter or the world is wrong.
     """
+    base, own = _own_configs(scenario, seed)
+    return own if len(own) == 1 else _placed(base, scenario, own)
+
+
+def load_scenario_kernels(scenario: Scenario) -> None:
+    """Loads the kernels that a scenario is flown by; those that the cache lacks are compiled, which takes minutes."""
+    if scenario.owner is not None:
+        import mission.follow.onboard_camera
+        import mission.follow.owner_device
+        import mission.scenario.flight.companions  # noqa: F401  (their kernels are loaded with the others)
+    try:
+        _, configs = _own_configs(scenario, scenario.seeds[0])
+    except UserError:
+        return  # who flies it says so
+    for config in {(config.airframe, config.has_lidar): config for config in configs}.values():
+        load_kernels(lambda _: None, config, has_camera=False)
+
+
+def _own_configs(scenario: Scenario, seed: int) -> tuple[FlightConfig, list[FlightConfig]]:
+    """What all vehicles have in common, and the configuration of each, which is not yet in its place.
+
+    Raises:
+        KeyRefusal: an airframe, a parameter or the world is wrong.
+    """
     fleet = scenario.fleet
     home = DEFAULT_HOME if scenario.home is None else GeoPoint(*scenario.home.model_dump().values())
     base = FlightConfig(
@@ -124,7 +149,7 @@ def flight_configs(scenario: Scenario, seed: int) -> list[FlightConfig]:
         airframe = airframe_of(vehicle, key)
         own.append(_own(base, scenario, vehicle, drives=class_of(airframe).drives))
         check_parameters(own[-1], airframe, key)
-    return own if len(own) == 1 else _placed(base, scenario, own)
+    return base, own
 
 
 def check_scenario(scenario: Scenario, file: str, *, is_whole: bool = True) -> None:

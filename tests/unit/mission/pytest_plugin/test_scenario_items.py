@@ -1,6 +1,9 @@
 """Scenario files are collected by a plain `pytest`, one test per seed, and say what `honeyguide test` says."""
 
+from pathlib import Path
+
 import pytest
+import warp as wp
 from typer.testing import CliRunner
 
 from mission.cli import app
@@ -24,7 +27,9 @@ def test_each_seed_is_a_test(pytester, run):
     run("-k", "seed1").assert_outcomes(passed=1)
 
 
-def test_what_failed_is_told_as_by_the_command(pytester, run):
+def test_what_failed_is_told_as_by_the_command(pytester, run, monkeypatch):
+    kernels = Path(wp.config.kernel_cache_dir).parent  # pytester has taken the home folder away
+    monkeypatch.setenv("WARP_CACHE_PATH", str(kernels))
     (pytester.path / "hop.scenario.yaml").write_text(HOP + "checks: [{tilt: {max: 3}}]\n")
     told = CliRunner().invoke(app, ["test", "hop.scenario.yaml", "--jobs", "1", "--keep", "kept"]).stdout
     result = run("--honeyguide-keep", "kept")

@@ -7,6 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mission.cli import app
+from mission.scenario.keeping import emptied
 
 HOP = """world: {kind: plain}
 seeds: [1, 2]
@@ -15,6 +16,19 @@ vehicle:
 checks:
   - altitude: {max: 6}
   - at_end: {is_armed: false}
+"""
+BAD = """import os, signal
+
+async def die(drone):
+    await drone.wait_ready()
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+async def leave(drone):
+    raise SystemExit(3)
+
+async def hang(drone):
+    while True:
+        pass
 """
 
 
@@ -70,6 +84,28 @@ def test_a_passing_run_is_kept_if_asked_for_and_for_foxglove_too(folder):
     result = run(folder, "--seeds", 1, "--jobs", 1, "--keep", kept, "--keep-all", "--mcap", "--quiet")
     assert result.exit_code == 0, result.output
     assert (kept / "hop-seed1" / "flight.mcap").read_bytes().startswith(b"\x89MCAP0\r\n")
+
+
+def test_a_script_that_takes_its_process_with_it_fails_alone(folder):
+    (folder / "bad.py").write_text(BAD)
+    for name in ("die", "hang", "leave"):
+        (folder / f"{name}.scenario.yaml").write_text(f"world: {{kind: plain}}\nvehicle: {{python: 'bad.py:{name}'}}\n")
+    keep, junit = folder / "kept", folder / "junit.xml"
+    result = run(folder, "--seeds", 1, "--jobs", 2, "--run-max", 10, "--keep", keep, "--junit", junit)
+    assert result.exit_code == 1, result.output
+    assert "1 of 4 passed" in result.output
+    suites = ET.parse(junit).getroot()
+    errors = {suite.get("name"): [each.get("message") for each in suite.iter("error")] for suite in suites}
+    assert errors == {
+        "die seed 1": ["its process died (signal 11, Segmentation fault)"],
+        "hang seed 1": ["hung: its process was ended after 10 s"],
+        "hop seed 1": [],
+        "leave seed 1": [f"{folder / 'bad.py'}:leave, line 8: SystemExit: 3"],
+    }
+    died = keep / "die-seed1"
+    assert "signal 11" in json.loads((died / "result.json").read_text())["error"]
+    assert f"again: honeyguide test {died / 'die.scenario.yaml'}" in result.output.replace("\n", "")
+    assert emptied(died) == died  # the next run of it may be kept there
 
 
 @pytest.mark.parametrize(

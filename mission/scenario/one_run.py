@@ -1,0 +1,131 @@
+"""One run of a scenario, before and after: flown, kept if it is to be, and said how it is flown again.
+
+In: a `Planned`. Out: a `Flown`. pytest flies it where it is, `honeyguide test` in a process, which it may take with it.
+"""
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mission.console.option_checks import UserError
+from mission.scenario.flight.building import load_scenario_kernels
+from mission.scenario.keeping import emptied, keep_scenario, run_folder_of
+from mission.scenario.result import ScenarioResult
+from mission.scenario.runner import run_scenario, write_result
+from mission.scenario.scenario import Scenario
+from mission.scenario.scenario_file import ScenarioFile
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """One run of one scenario."""
+
+    scenario: Scenario
+    file: str
+    seed: int
+    folder: Path | None
+    """Where it is kept if it fails; None: nowhere."""
+    keeps_all: bool = False
+    """And if it passes."""
+    has_mcap: bool = False
+    """Those that are kept have an MCAP file beside each log."""
+
+    @property
+    def key(self) -> tuple[str, int]:
+        return self.file, self.seed
+
+    def unjudged(self, error: str) -> ScenarioResult:
+        """The result of a run that did not come to its end."""
+        name, folder = self.scenario.name or "scenario", "" if self.folder is None else str(self.folder)
+        return ScenarioResult(name, self.file, self.seed, (), error, folder=folder)
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """What came of it."""
+
+    result: ScenarioResult | None
+    refusal: str = ""
+    """Why it could not be flown at all."""
+    command: str = ""
+    """That flies a kept run again."""
+
+
+def planned_runs(
+    files: Sequence[ScenarioFile], seeds: Sequence[int] | None, keep: Path | None, *, keeps_all: bool, has_mcap: bool
+) -> list[Planned]:
+    """The runs of scenarios, each once.
+
+    Args:
+        files: the scenarios.
+        seeds: of each; None: its own.
+        keep: where runs that fail are kept; None: nowhere.
+        keeps_all: those that pass, too.
+        has_mcap: those that are kept have an MCAP file beside each log.
+    """
+    return [
+        Planned(
+            file.scenario,
+            str(file.path),
+            seed,
+            None if keep is None else run_folder_of(keep, file.scenario, seed),
+            keeps_all=keeps_all,
+            has_mcap=has_mcap,
+        )
+        for file in files
+        for seed in dict.fromkeys(seeds or file.scenario.seeds)
+    ]
+
+
+class ScenarioRuns:
+    """Runs of scenarios, as worker processes do them."""
+
+    def prepare(self, planned: Sequence[Planned]) -> None:
+        for each in planned:
+            load_scenario_kernels(each.scenario)
+
+    def outcomes(self, planned: Sequence[Planned]) -> list[Flown]:
+        return [fly(each) for each in planned]
+
+    def lost(self, planned: Planned, reason: str) -> Flown:
+        """A run whose process ended or hung; what was written of its logs is kept."""
+        result = planned.unjudged(reason)
+        if planned.folder is None:
+            return Flown(result)
+        planned.folder.mkdir(parents=True, exist_ok=True)
+        write_result(planned.folder, result)
+        return Flown(result, command=keep_scenario(planned.folder, planned.scenario, planned.seed))
+
+
+def fly(planned: Planned) -> Flown:
+    """One run, in this process."""
+    folder = planned.folder
+    try:
+        if folder is not None:  # from now on it is a kept run, whatever ends this process
+            emptied(folder).mkdir(parents=True)
+            write_result(folder, planned.unjudged("its process was ended"))
+        result = run_scenario(planned.scenario, planned.seed, folder=folder, file=planned.file)
+    except UserError as error:
+        return Flown(None, planned.scenario.refusal(error, planned.file))
+    if folder is None:
+        return Flown(result)
+    if result.passed and not planned.keeps_all:
+        shutil.rmtree(folder)
+        return Flown(replace(result, folder="", ulogs=(), tlogs=()))
+    if planned.has_mcap:
+        from mission.foxglove.convert import convert
+
+        for ulog in map(Path, result.ulogs):
+            convert(ulog, ulog.with_suffix(".mcap"))
+    return Flown(result, command=keep_scenario(folder, planned.scenario, planned.seed))
+
+
+def failure_lines(flown: Flown) -> list[str]:
+    """What failed of a run, and how it is flown again."""
+    result = flown.result
+    if result is None:
+        return [flown.refusal]
+    kept = [f"  kept in {result.folder}; again: {flown.command}"] if flown.command else []
+    done = [f"  {time_s:.1f} s {text}" for time_s, _, text in result.events]
+    return [f"{result.name}, seed {result.seed}:", *(f"  {text}" for text in result.failures), *done, *kept]
