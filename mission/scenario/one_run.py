@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mission.console.option_checks import UserError
 from mission.scenario.flight.building import load_scenario_kernels
-from mission.scenario.keeping import emptied, keep_scenario, run_folder_of
+from mission.scenario.keeping import check_apart, emptied, keep_scenario, run_folder, run_names
 from mission.scenario.result import ScenarioResult
 from mission.scenario.runner import run_scenario, write_result
 from mission.scenario.scenario import Scenario
@@ -63,19 +63,25 @@ def planned_runs(
         keep: where runs that fail are kept; None: nowhere.
         keeps_all: those that pass, too.
         has_mcap: those that are kept have an MCAP file beside each log.
+
+    Raises:
+        UserError: a run would be kept where its scenario is.
     """
-    return [
+    names = run_names([(file.path, file.scenario.name) for file in files])
+    planned = [
         Planned(
             file.scenario,
             str(file.path),
             seed,
-            None if keep is None else run_folder_of(keep, file.scenario, seed),
+            None if keep is None else run_folder(keep, name, seed),
             keeps_all=keeps_all,
             has_mcap=has_mcap,
         )
-        for file in files
+        for file, name in zip(files, names, strict=True)
         for seed in dict.fromkeys(seeds or file.scenario.seeds)
     ]
+    check_apart([each.folder for each in planned if each.folder is not None], [file.path for file in files])
+    return planned
 
 
 class ScenarioRuns:

@@ -48,6 +48,13 @@ def test_all_are_kept_if_asked_for(pytester, run):
     assert sorted(each.name for each in (pytester.path / "kept").iterdir()) == ["hop-seed1", "hop-seed2"]
 
 
+def test_runs_of_equal_names_are_kept_by_their_folders(pytester, run):
+    for name in ("a", "b"):
+        pytester.mkdir(name).joinpath("hop.scenario.yaml").write_text(HOP)
+    run("--honeyguide-keep", "kept", "--honeyguide-keep-all", "-k", "seed1").assert_outcomes(passed=2)
+    assert sorted(each.name for each in (pytester.path / "kept").iterdir()) == ["a-hop-seed1", "b-hop-seed1"]
+
+
 def test_a_wrong_file_is_one_sentence(pytester, run):
     (pytester.path / "hop.scenario.yaml").write_text("seeds: [1, 2]\nvehicle: {scrit: [arm]}\n")
     result = run()

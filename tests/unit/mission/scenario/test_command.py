@@ -1,13 +1,14 @@
 """`honeyguide test`: exit codes, JUnit, kept runs that can be flown again, the schema."""
 
 import json
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
 from typer.testing import CliRunner
 
 from mission.cli import app
-from mission.scenario.keeping import emptied
+from mission.scenario.keeping import emptied, run_names
 
 HOP = """world: {kind: plain}
 seeds: [1, 2]
@@ -71,6 +72,50 @@ def test_a_failing_run_is_kept_and_can_be_flown_again(folder):
     assert (twice / "flight.ulg").read_bytes() == (kept / "flight.ulg").read_bytes()
     one, two = (json.loads((each / "result.json").read_text()) for each in (kept, twice))
     assert one["checks"] == two["checks"]
+
+
+@pytest.mark.parametrize(
+    ("files", "names"),
+    [
+        (["hop", "sub/square"], ["hop", "square"]),
+        (["a/hop", "b/hop", "c/square"], ["a-hop", "b-hop", "square"]),
+        (["a/c/hop", "b/c/hop", "b/hop"], ["a-c-hop", "b-c-hop", "b-hop"]),
+    ],
+)
+def test_runs_of_equal_names_are_kept_by_their_folders(files, names):
+    assert run_names([(Path(f"{file}.scenario.yaml"), file.rpartition("/")[2]) for file in files]) == names
+
+
+def test_a_name_made_by_folders_is_no_other_scenarios_name():
+    found = run_names([(Path(f"{file}.scenario.yaml"), file.rpartition("/")[2]) for file in ("a/x", "b/x", "a-x")])
+    assert len(set(found)) == 3
+
+
+def test_runs_of_a_folder_with_equal_names_are_kept_by_their_files():
+    assert run_names([(Path(f"{file}.scenario.yaml"), "hop") for file in "abc"]) == ["a-hop", "b-hop", "c-hop"]
+
+
+def test_both_of_two_files_of_one_name_are_kept(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "hop.scenario.yaml").write_text(HOP.replace("max: 6", "max: 4"))
+    keep = tmp_path / "kept"
+    result = run(tmp_path, tmp_path / "a/../b/hop.scenario.yaml", "--seeds", "1,1", "--jobs", 2, "--keep", keep)
+    assert result.exit_code == 1
+    assert "0 of 2 passed" in result.output
+    assert sorted(each.name for each in keep.glob("*/flight.ulg")) == ["flight.ulg", "flight.ulg"]
+    assert sorted(each.name for each in keep.iterdir()) == ["a-hop-seed1", "b-hop-seed1"]
+
+
+def test_no_run_is_kept_where_its_scenario_is(folder):
+    kept = folder / "hop-seed1"
+    kept.mkdir()
+    (kept / "result.json").write_text("{}")
+    (folder / "hop.scenario.yaml").rename(kept / "hop.scenario.yaml")
+    result = run(kept / "hop.scenario.yaml", "--keep", folder)
+    assert result.exit_code == 2
+    assert "where it is: keep it elsewhere" in result.output.replace("\n", " ")
+    assert (kept / "hop.scenario.yaml").is_file()
 
 
 def test_a_passing_run_is_not_kept(folder):

@@ -365,3 +365,17 @@ def test_a_kept_scenario_needs_no_file_of_where_it_came_from(tmp_path):
     check_scenario(again, "own")
     assert again.seeds == (3,)
     assert Path(again.vehicle.airframe) == kept / "mine.toml"
+
+
+def test_kept_files_of_one_name_stay_apart(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "hop.py").write_text(f"async def hop(drone): '{name}'\n")
+    scenario = tmp_path / "two.scenario.yaml"
+    scenario.write_text("vehicles: [{python: 'a/hop.py:hop'}, {python: 'b/hop.py:hop'}, {python: 'a/hop.py:hop'}]\n")
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    keep_scenario(kept, read_scenario(scenario), 3)
+    files = [Path(vehicle.python.removesuffix(":hop")) for vehicle in read_scenario(kept / "two.scenario.yaml").fleet]
+    assert ["'a'" in file.read_text() for file in files] == [True, False, True]
+    assert {file.parent for file in files} == {kept}
