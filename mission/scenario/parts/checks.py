@@ -8,7 +8,18 @@ from typing import ClassVar, Literal, Self
 from pydantic import ConfigDict, Field, model_validator
 
 from mission.scenario.parts.conditions import Condition
-from mission.scenario.parts.part import Finite, Metres, OneOf, Part, Place, Point, Seconds, Short, check_order
+from mission.scenario.parts.part import (
+    Finite,
+    Metres,
+    OneOf,
+    Part,
+    Place,
+    Point,
+    Seconds,
+    Short,
+    check_asked,
+    check_order,
+)
 from mission.scenario.parts.steps import ModeName
 
 
@@ -86,6 +97,11 @@ class Estimator(Part):
     percent: float = Field(default=100.0, gt=0.0, le=100.0)
     """Of the time."""
 
+    @model_validator(mode="after")
+    def _has_a_bound(self) -> Self:
+        check_asked(self, "horizontal_m", "vertical_m", "velocity_m_s", "tilt_deg", "heading_deg")
+        return self
+
 
 class Clearance(Short):
     """It keeps away from trees, walls, boxes, meshes and pads while armed: what starts on a pad needs a `from`."""
@@ -108,7 +124,8 @@ class Duration(Part):
     max_s: Seconds | None = None
 
     @model_validator(mode="after")
-    def _is_in_order(self) -> Self:
+    def _has_a_bound(self) -> Self:
+        check_asked(self, "min_s", "max_s")
         check_order(self.min_s, self.max_s, ("min_s", "max_s"))
         return self
 
@@ -146,6 +163,11 @@ class Battery(Part):
     """At the nominal voltage."""
     remaining_min: float | None = Field(default=None, ge=0.0, le=1.0)
 
+    @model_validator(mode="after")
+    def _has_a_bound(self) -> Self:
+        check_asked(self, "used_max_mah", "used_max_wh", "remaining_min")
+        return self
+
 
 class AtEnd(Part):
     """How it stands when the flight is over."""
@@ -157,6 +179,13 @@ class AtEnd(Part):
     """North, east of home [m]."""
     within_m: float = Field(default=1.0, gt=0.0, le=10_000.0)
     """Of `near`."""
+
+    @model_validator(mode="after")
+    def _asks_something(self) -> Self:
+        check_asked(self, "is_armed", "is_landed", "is_crashed", "near")
+        if self.near is None and "within_m" in self.model_fields_set:
+            raise ValueError("within_m: is of near, which is left out")
+        return self
 
 
 class Reached(Short):
@@ -209,7 +238,8 @@ class Following(Part):
     has_collision: bool | None = False
 
     @model_validator(mode="after")
-    def _is_in_order(self) -> Self:
+    def _asks_something(self) -> Self:
+        check_asked(self, "in_band_min", "in_view_min", "distance_min_m", "distance_max_m", "has_collision")
         check_order(self.distance_min_m, self.distance_max_m, ("distance_min_m", "distance_max_m"))
         return self
 
@@ -275,7 +305,7 @@ class Check(OneOf):
     no_contact: NoContact | None = None
     touch_down: TouchDown | None = None
     following: Following | None = None
-    scorecard: dict[FigureName, Range] | None = None
+    scorecard: dict[FigureName, Range] | None = Field(default=None, min_length=1)
     """Figures of the scorecard of FollowMe, as `honeyguide follow` shows them, each with its bounds."""
     interventions: Interventions | None = None
 

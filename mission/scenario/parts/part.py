@@ -51,6 +51,12 @@ def check_order(low: float | None, high: float | None, names: tuple[str, str] = 
         raise ValueError(f"{names[0]} {low:g} is above {names[1]} {high:g}")
 
 
+def check_asked(part: BaseModel, *names: str) -> None:
+    """Refuses a check that passes whatever happens: it gives none of these."""
+    if all(getattr(part, name) is None for name in names):
+        raise ValueError(f"asks for nothing: needs {', '.join(names[:-1])} or {names[-1]}")
+
+
 class Part(BaseModel):
     """A mapping of a scenario."""
 

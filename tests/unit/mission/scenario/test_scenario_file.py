@@ -159,6 +159,32 @@ def test_a_fault_is_one_sentence_with_its_place(tmp_path, old, new, fault):
     assert "\n" not in said
 
 
+@pytest.mark.parametrize(
+    ("check", "fault"),
+    [
+        (
+            "estimator",
+            ".estimator: asks for nothing: needs horizontal_m, vertical_m, velocity_m_s, tilt_deg or heading_deg",
+        ),
+        ("estimator: {percent: 90}", ".estimator: asks for nothing: needs horizontal_m,"),
+        ("duration: {}", ".duration: asks for nothing: needs min_s or max_s"),
+        ("battery:", ".battery: asks for nothing: needs used_max_mah, used_max_wh or remaining_min"),
+        ("at_end: {is_crashed: null}", ".at_end: asks for nothing: needs is_armed, is_landed, is_crashed or near"),
+        ("at_end: {within_m: 3}", ".at_end: within_m: is of near, which is left out"),
+        ("following: {has_collision: null}", ".following: asks for nothing: needs in_band_min,"),
+        ("scorecard: {}", ".scorecard: must not be empty"),
+        ("scorecard: {in_view: {}}", ".scorecard.in_view: needs min, max or both"),
+    ],
+)
+def test_a_check_that_asks_for_nothing_is_refused(tmp_path, check, fault):
+    assert f": checks[0]{fault}" in fault_of(HOP.replace("at_end: {is_armed: false}", check), tmp_path)
+
+
+@pytest.mark.parametrize("check", ["at_end", "following", "no_contact"])
+def test_a_check_with_a_default_may_be_its_name_alone(tmp_path, check):
+    assert parsed(HOP.replace("at_end: {is_armed: false}", check), tmp_path).checks[0].name_chosen == check
+
+
 def test_the_word_off_is_no_boolean(tmp_path):
     text = HOP + "faults:\n  - at: 3\n    sensor: {name: gnss, mode: off}\n"
     assert parsed(text, tmp_path).faults[0].sensor.mode == "off"
