@@ -10,6 +10,7 @@ from pydantic import ConfigDict, Field, model_validator
 from mission.scenario.parts.conditions import Condition
 from mission.scenario.parts.part import (
     Finite,
+    KeyRefusal,
     Metres,
     OneOf,
     Part,
@@ -111,7 +112,7 @@ class Clearance(Short):
 
 
 class Separation(Short):
-    """All vehicles keep away from each other, while armed."""
+    """All vehicles keep away from each other, or one from all others, while armed."""
 
     short: ClassVar[str] = "min_m"
     min_m: Metres
@@ -257,6 +258,10 @@ class Interventions(Short):
     max_per_min: float = Field(ge=0.0)
 
 
+_OF_THE_WHOLE = ("at_end", "following", "scorecard", "interventions")
+_OF_ANY_MODE = ("modes", "separation")
+
+
 class Check(OneOf):
     """One thing asked of the flight."""
 
@@ -266,12 +271,12 @@ class Check(OneOf):
     besides: ClassVar[frozenset[str]] = frozenset({"name", "from_", "to", "vehicle", "during"})
     name: str = ""
     """How reports call it; left out: by what it is."""
-    from_: float | str | None = Field(default=None, alias="from")
+    from_: Finite | str | None = Field(default=None, alias="from")
     """Looks from this simulated time [s], or this mark, on; `item 3` is when that item of its mission is reached."""
-    to: float | str | None = None
+    to: Finite | str | None = None
     """Looks until this simulated time [s], or this mark."""
     during: ModeName | None = None
-    """Looks at the time in this flight mode only."""
+    """Looks at the time while armed in this flight mode only."""
     vehicle: int | None = Field(default=None, ge=1, le=50)
     """Of several the one to look at, from 1; left out: each."""
     altitude: Range | None = None
@@ -318,4 +323,10 @@ class Check(OneOf):
     def _looks_at_something(self) -> Self:
         if not isinstance(self.from_, str) and not isinstance(self.to, str):
             check_order(self.from_, self.to, ("from", "to"))
+        name, given = self.name_chosen, {"from": self.from_, "to": self.to, "during": self.during}
+        for key in [key for key, value in given.items() if value is not None]:
+            if name in _OF_THE_WHOLE:
+                raise KeyRefusal((key,), f"{name} is of the whole flight, not of a part: leave it out")
+            if name in _OF_ANY_MODE and key == "during":
+                raise KeyRefusal((key,), f"{name} is of all flight modes: leave it out, or use from and to")
         return self

@@ -180,6 +180,24 @@ def test_a_check_that_asks_for_nothing_is_refused(tmp_path, check, fault):
     assert f": checks[0]{fault}" in fault_of(HOP.replace("at_end: {is_armed: false}", check), tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("check", "fault"),
+    [
+        ("at_end:\n    from: 3", "from: at_end is of the whole flight, not of a part: leave it out"),
+        ("at_end:\n    during: land", "during: at_end is of the whole flight"),
+        ("following:\n    to: 30", "to: following is of the whole flight"),
+        ("scorecard: {in_view: {min: 0.5}}\n    during: hold", "during: scorecard is of the whole flight"),
+        ("interventions: 3\n    from: 3", "from: interventions is of the whole flight"),
+        ("modes: [land]\n    during: land", "during: modes is of all flight modes: leave it out, or use from and to"),
+        ("separation: 3\n    during: land", "during: separation is of all flight modes"),
+        ("not_heard: x\n    to: .nan", "to"),
+    ],
+)
+def test_a_part_of_the_flight_that_a_check_does_not_look_at_is_refused(tmp_path, check, fault):
+    said = fault_of(HOP.replace("at_end: {is_armed: false}", check), tmp_path)
+    assert said.startswith(f"hop.scenario.yaml:9: checks[0].{fault}")
+
+
 @pytest.mark.parametrize("check", ["at_end", "following", "no_contact"])
 def test_a_check_with_a_default_may_be_its_name_alone(tmp_path, check):
     assert parsed(HOP.replace("at_end: {is_armed: false}", check), tmp_path).checks[0].name_chosen == check
