@@ -3,6 +3,7 @@
 In: a `Planned`. Out: a `Flown`. pytest flies it where it is, `honeyguide test` in a process, which it may take with it.
 """
 
+import shlex
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +13,7 @@ from mission.console.option_checks import UserError
 from mission.scenario.flight.building import load_scenario_kernels
 from mission.scenario.keeping import check_apart, emptied, keep_scenario, run_folder, run_names
 from mission.scenario.result import ScenarioResult
-from mission.scenario.runner import run_scenario, write_result
+from mission.scenario.runner import RESULT_FILE, run_scenario, write_result
 from mission.scenario.scenario import Scenario
 from mission.scenario.scenario_file import ScenarioFile
 
@@ -132,6 +133,8 @@ def failure_lines(flown: Flown) -> list[str]:
     result = flown.result
     if result is None:
         return [flown.refusal]
-    kept = [f"  kept in {result.folder}; again: {flown.command}"] if flown.command else []
+    is_kept = (Path(result.file).parent / RESULT_FILE).is_file()
+    again = f"honeyguide test {shlex.quote(result.file)} --seeds {result.seed}{'' if is_kept else ' --keep failed'}"
+    how = f"kept in {result.folder}; again: {flown.command}" if flown.command else f"again: {again}"
     done = [f"  {time_s:.1f} s {text}" for time_s, _, text in result.events]
-    return [f"{result.name}, seed {result.seed}:", *(f"  {text}" for text in result.failures), *done, *kept]
+    return [f"{result.name}, seed {result.seed}:", *(f"  {text}" for text in result.failures), *done, f"  {how}"]

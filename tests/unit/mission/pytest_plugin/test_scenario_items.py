@@ -38,6 +38,9 @@ def test_what_failed_is_told_as_by_the_command(pytester, run, monkeypatch):
     for line in told.splitlines()[first : first + 3]:
         assert line in result.outlines
     assert (pytester.path / "kept" / "hop-seed1" / "flight.ulg").is_file()
+    result = run("-k", "seed2")
+    file = pytester.path / "hop.scenario.yaml"
+    result.stdout.fnmatch_lines([f"  again: honeyguide test {file} --seeds 2 --keep failed"])
 
 
 def test_all_are_kept_if_asked_for(pytester, run):

@@ -95,6 +95,13 @@ def test_runs_of_a_folder_with_equal_names_are_kept_by_their_files():
     assert run_names([(Path(f"{file}.scenario.yaml"), "hop") for file in "abc"]) == ["a-hop", "b-hop", "c-hop"]
 
 
+def test_a_failing_run_that_is_not_kept_can_be_flown_again(folder):
+    file = folder / "hop.scenario.yaml"
+    file.write_text(HOP.replace("max: 6", "max: 4"))
+    output = run(file, "--seeds", 7, "--jobs", 1, "--quiet").output
+    assert f"again: honeyguide test {file} --seeds 7 --keep failed" in output.splitlines()[-2]
+
+
 def test_both_of_two_files_of_one_name_are_kept(tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
