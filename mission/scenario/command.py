@@ -14,7 +14,6 @@ from mission.console.terminal import loading
 if TYPE_CHECKING:
     from mission.scenario.scenario_file import ScenarioFile
 
-SEED_MAX = 2**31 - 1
 RUN_MAX_S = 1800.0  # wall clock: ten minutes of many vehicles or of a policy take minutes
 
 
@@ -69,6 +68,7 @@ def fly_scenarios(
                     check_scenario(file.scenario, str(file.path))
             planned = planned_runs(scenarios, chosen, keep, keeps_all=keep_all, has_mcap=mcap)
             count = jobs or len(os.sched_getaffinity(0))
+            _check_written(keep, junit)
             code = scenario_session(planned, count, run_max, junit=junit, is_quiet=quiet)
     except UserError as error:
         refuse(str(error))
@@ -88,8 +88,30 @@ def _that_can_be_flown(files: list["ScenarioFile"]) -> list["ScenarioFile"]:
     return [file for file in files if file not in left_out]
 
 
+def _check_written(keep: Path | None, junit: Path | None) -> None:
+    """Refuses, before anything is flown, a folder and a file that cannot be written after it."""
+    from common.files import part_path
+    from mission.console.option_checks import UserError
+
+    option = f"--keep {keep}"
+    try:
+        if keep is not None:
+            keep.mkdir(parents=True, exist_ok=True)
+            (keep / ".part").touch()
+            (keep / ".part").unlink()
+        option = f"--junit {junit}"
+        if junit is not None:
+            if junit.is_dir():
+                raise UserError(f"{option}: is a folder")
+            part_path(junit).touch()
+            part_path(junit).unlink()
+    except OSError as error:
+        raise UserError(f"{option}: cannot be written: {error.strerror}") from error
+
+
 def _seeds(text: str) -> tuple[int, ...]:
     from mission.console.option_checks import UserError
+    from mission.scenario.scenario import SEED_MAX
 
     try:
         seeds = tuple(int(part) for part in text.split(","))

@@ -51,6 +51,8 @@ class Flown:
     """Why it could not be flown at all."""
     command: str = ""
     """That flies a kept run again."""
+    note: str = ""
+    """What was not kept of it, and why."""
 
 
 def planned_runs(
@@ -97,12 +99,15 @@ class ScenarioRuns:
 
     def lost(self, planned: Planned, reason: str) -> Flown:
         """A run whose process ended or hung; what was written of its logs is kept."""
-        result = planned.unjudged(reason)
-        if planned.folder is None:
-            return Flown(result)
-        planned.folder.mkdir(parents=True, exist_ok=True)
-        write_result(planned.folder, result)
-        return Flown(result, command=keep_scenario(planned.folder, planned.scenario, planned.seed))
+        result, folder = planned.unjudged(reason), planned.folder
+        try:
+            if folder is None:
+                return Flown(result)
+            folder.mkdir(parents=True, exist_ok=True)
+            write_result(folder, result)
+            return Flown(result, command=keep_scenario(folder, planned.scenario, planned.seed))
+        except OSError as error:
+            return Flown(result, note=_unwritten(planned, error))
 
 
 def fly(planned: Planned) -> Flown:
@@ -115,17 +120,46 @@ def fly(planned: Planned) -> Flown:
         result = run_scenario(planned.scenario, planned.seed, folder=folder, file=planned.file)
     except UserError as error:
         return Flown(None, planned.scenario.refusal(error, planned.file))
+    except OSError as error:
+        if folder is None:
+            raise
+        return Flown(None, _unwritten(planned, error))
+    try:
+        return _kept(planned, result)
+    except OSError as error:
+        return Flown(result, note=_unwritten(planned, error))
+
+
+def _kept(planned: Planned, result: ScenarioResult) -> Flown:
+    """A run that was judged, kept if it is to be.
+
+    Raises:
+        OSError: it cannot be.
+    """
+    folder = planned.folder
     if folder is None:
         return Flown(result)
     if result.passed and not planned.keeps_all:
         shutil.rmtree(folder)
         return Flown(replace(result, folder="", ulogs=(), tlogs=()))
-    if planned.has_mcap:
-        from mission.foxglove.convert import convert
+    command = keep_scenario(folder, planned.scenario, planned.seed)
+    return Flown(result, command=command, note=_mcap_trouble(result) if planned.has_mcap else "")
 
+
+def _mcap_trouble(result: ScenarioResult) -> str:
+    """Writes an MCAP file beside each log; why one could not be written, "": all are."""
+    from mission.foxglove.convert import ConversionError, convert
+
+    try:
         for ulog in map(Path, result.ulogs):
             convert(ulog, ulog.with_suffix(".mcap"))
-    return Flown(result, command=keep_scenario(folder, planned.scenario, planned.seed))
+    except (ConversionError, OSError) as error:
+        return f"--mcap: {error}"
+    return ""
+
+
+def _unwritten(planned: Planned, error: OSError) -> str:
+    return f"{error.filename or planned.folder}: cannot be written: {error.strerror or error}"
 
 
 def failure_lines(flown: Flown) -> list[str]:

@@ -21,6 +21,7 @@ from mission.scenario.parts.steps import Step
 
 WorldName = Literal["hills", "plain", "airfield", "follow", "forest", "walled-forest", "course", "car-park"]
 VEHICLES_MAX = 50
+SEED_MAX = 2**31 - 1
 ITEM_MARK = "item "  # of a mission: the moment is when it is reached
 
 
@@ -167,7 +168,7 @@ class Scenario(Part):
     """Left out: the file's."""
     about: str = ""
     """What it shows, in a sentence."""
-    seeds: tuple[int, ...] = Field(default=(1,), min_length=1, max_length=10_000)
+    seeds: tuple[Annotated[int, Field(ge=0, le=SEED_MAX)], ...] = Field(default=(1,), min_length=1, max_length=10_000)
     """Of noise, turbulence and the owner's path; it is flown once with each."""
     time_max_s: float = Field(default=600.0, gt=0.0, le=36_000.0)
     """Simulated; a script that is not done by then has failed."""

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from common.files import write_whole
 from common.worker_processes import WorkerProcesses
+from mission.console.option_checks import UserError
 from mission.console.terminal import print_line
 from mission.scenario.junit import junit_text
 from mission.scenario.one_run import Flown, Planned, ScenarioRuns, failure_lines
@@ -46,7 +47,10 @@ def scenario_session(
         console.print(_table(results))
     _tell(flown, console)
     if junit is not None:
-        write_whole(junit, junit_text(results))
+        try:
+            write_whole(junit, junit_text(results))
+        except OSError as error:
+            raise UserError(f"--junit {junit}: cannot be written: {error.strerror}") from error
         print_line(console, f"JUnit: {junit}")
     for refusal in refusals:
         print_line(console, f"cannot be flown: {refusal}")
@@ -110,11 +114,13 @@ def _row(check: CheckResult) -> tuple[str, ...]:
 
 
 def _tell(flown: Sequence[Flown], console: Console) -> None:
-    """What failed, how it is flown again, and the sum."""
+    """What failed, how it is flown again, what could not be kept, and the sum."""
     results = [each.result for each in flown if each.result is not None]
     for each in flown:
         if each.result is not None and not each.result.passed:
             for line in failure_lines(each):
                 print_line(console, line)
+        if each.note:
+            print_line(console, each.note)
     passed, simulated_s = sum(result.passed for result in results), sum(result.simulated_s for result in results)
     print_line(console, f"{passed} of {len(flown)} passed, {simulated_s:.0f} simulated seconds")

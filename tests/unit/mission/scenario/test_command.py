@@ -9,6 +9,8 @@ from typer.testing import CliRunner
 
 from mission.cli import app
 from mission.scenario.keeping import emptied, run_names
+from mission.scenario.one_run import ScenarioRuns, fly, planned_runs
+from mission.scenario.scenario_file import ScenarioFile, read_scenario
 
 HOP = """world: {kind: plain}
 seeds: [1, 2]
@@ -160,6 +162,32 @@ def test_a_script_that_takes_its_process_with_it_fails_alone(folder):
     assert emptied(died) == died  # the next run of it may be kept there
 
 
+def test_a_run_whose_logs_cannot_be_kept_is_one_sentence(folder):
+    scenario, keep = read_scenario(folder / "hop.scenario.yaml"), folder / "kept"
+    keep.write_text("no folder")
+    (planned,) = planned_runs([ScenarioFile(folder, scenario)], [1], keep, keeps_all=True, has_mcap=False)
+    flown = fly(planned)
+    assert flown.result is None
+    assert flown.refusal == f"{keep / 'hop-seed1'}: cannot be written: Not a directory"
+    assert ScenarioRuns().lost(planned, "hung").note == f"{keep / 'hop-seed1'}: cannot be written: Not a directory"
+
+
+def test_a_log_of_which_no_mcap_can_be_made_is_one_sentence(folder, monkeypatch):
+    from mission.foxglove import convert
+
+    def refuse(log, target):
+        raise convert.ConversionError(f"{log}: holds no attitude and no position")
+
+    pytest.importorskip("foxglove")
+    monkeypatch.setattr(convert, "convert", refuse)
+    files = [ScenarioFile(folder, read_scenario(folder / "hop.scenario.yaml"))]
+    (planned,) = planned_runs(files, [1], folder / "kept", keeps_all=True, has_mcap=True)
+    flown = fly(planned)
+    assert flown.result.passed
+    assert flown.note.endswith("flight.ulg: holds no attitude and no position")
+    assert flown.command
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
@@ -167,6 +195,9 @@ def test_a_script_that_takes_its_process_with_it_fails_alone(folder):
         (["--mcap"], "test: --mcap needs --keep FOLDER"),
         (["--seeds", "1,x"], "--seeds 1,x: must be whole numbers from 0"),
         (["--junit", "/nowhere/junit.xml"], "--junit /nowhere/junit.xml: no such folder"),
+        (["--junit", "/proc/junit.xml"], "--junit /proc/junit.xml: cannot be written: "),
+        (["--junit", "/proc"], "--junit /proc: "),
+        (["--keep", "/proc/kept"], "--keep /proc/kept: cannot be written: "),
         (["missing"], "missing: no such file or folder"),
     ],
 )

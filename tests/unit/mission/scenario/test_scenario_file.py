@@ -99,6 +99,8 @@ def test_python_makes_the_same_scenario(tmp_path):
             "owner: {numbers: {xyz: 3}}\nabout:",
             "1: owner.numbers.xyz: unknown key; there are hill_height_m, trees_per_ha, owner_speed_max,",
         ),
+        ("about:", "seeds: [1, -1]\nabout:", "1: seeds[1]: must be at least 0, not -1"),
+        ("about:", "seeds: [2147483648]\nabout:", "1: seeds[0]: must be at most 2.14748e+09, not 2147483648"),
         ("about:", "aboot:", "1: aboot: unknown key; did you mean about?"),
         ("about: Up and down.", "about: [", "not YAML"),
         ("vehicle:\n", "vehicle:\n  plan: a.plan\n", "2: vehicle: plan and script: choose one"),
