@@ -205,6 +205,22 @@ def test_a_check_with_a_default_may_be_its_name_alone(tmp_path, check):
     assert parsed(HOP.replace("at_end: {is_armed: false}", check), tmp_path).checks[0].name_chosen == check
 
 
+@pytest.mark.parametrize(
+    ("fence", "fault"),
+    [
+        ("{}", "a fence is either a circle (circle_ne_m, radius_m) or a polygon (polygon_ne_m)"),
+        ("{keeps: out}", "a fence is either a circle"),
+        ("{radius_m: 40}", "a circle has both circle_ne_m (its middle) and radius_m"),
+        ("{circle_ne_m: [0, 0]}", "a circle has both"),
+        ("{polygon_ne_m: [[0, 0], [0, 9], [9, 0]], radius_m: 3}", "a circle has both"),
+        ("{polygon_ne_m: [[0, 0], [0, 9], [9, 0]], circle_ne_m: [0, 0], radius_m: 3}", "a fence is either a circle"),
+    ],
+)
+def test_a_fence_of_no_shape_or_two_is_refused(tmp_path, fence, fault):
+    said = fault_of(HOP.replace("takeoff: 5", f"fence: {fence}"), tmp_path)
+    assert said.startswith(f"hop.scenario.yaml:5: vehicle.script[1].fence: {fault}")
+
+
 def test_the_word_off_is_no_boolean(tmp_path):
     text = HOP + "faults:\n  - at: 3\n    sensor: {name: gnss, mode: off}\n"
     assert parsed(text, tmp_path).faults[0].sensor.mode == "off"
