@@ -16,7 +16,7 @@ from mission.console.option_checks import UserError
 from mission.flight_settings import EngineName, Pace
 from mission.scenario.parts.checks import Check
 from mission.scenario.parts.faults import Fault
-from mission.scenario.parts.part import Finite, Key, KeyRefusal, Part, Place
+from mission.scenario.parts.part import FileName, Finite, Key, KeyRefusal, Part, Place
 from mission.scenario.parts.steps import Step
 
 WorldName = Literal["hills", "plain", "airfield", "follow", "forest", "walled-forest", "course", "car-park"]
@@ -164,7 +164,7 @@ class Scenario(Part):
     """One scenario."""
 
     _source: Source = PrivateAttr(default_factory=Source)
-    name: str = ""
+    name: FileName = ""
     """Left out: the file's."""
     about: str = ""
     """What it shows, in a sentence."""

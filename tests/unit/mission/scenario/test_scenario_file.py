@@ -101,6 +101,10 @@ def test_python_makes_the_same_scenario(tmp_path):
         ),
         ("about:", "seeds: [1, -1]\nabout:", "1: seeds[1]: must be at least 0, not -1"),
         ("about:", "seeds: [2147483648]\nabout:", "1: seeds[0]: must be at most 2.14748e+09, not 2147483648"),
+        *(
+            ("about:", f"name: {name}\nabout:", f"1: name: is the name of files and folders: no path, not {name!r}")
+            for name in ("../esc", "/tmp/esc", "a\\b", "..")
+        ),
         ("about:", "aboot:", "1: aboot: unknown key; did you mean about?"),
         ("about: Up and down.", "about: [", "not YAML"),
         ("vehicle:\n", "vehicle:\n  plan: a.plan\n", "2: vehicle: plan and script: choose one"),
