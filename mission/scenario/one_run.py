@@ -36,6 +36,10 @@ class Planned:
     def key(self) -> tuple[str, int]:
         return self.file, self.seed
 
+    def refused(self, refusal: str) -> ScenarioResult:
+        """The result of a run that cannot be flown at all."""
+        return replace(self.unjudged(refusal), folder="")
+
     def unjudged(self, error: str) -> ScenarioResult:
         """The result of a run that did not come to its end."""
         name, folder = self.scenario.name or "scenario", "" if self.folder is None else str(self.folder)
@@ -117,7 +121,7 @@ def fly(planned: Planned) -> Flown:
         if folder is not None:  # from now on it is a kept run, whatever ends this process
             emptied(folder).mkdir(parents=True)
             write_result(folder, planned.unjudged("its process was ended"))
-        result = run_scenario(planned.scenario, planned.seed, folder=folder, file=planned.file)
+        result = _judged(planned)
     except UserError as error:
         return Flown(None, planned.scenario.refusal(error, planned.file))
     except OSError as error:
@@ -128,6 +132,20 @@ def fly(planned: Planned) -> Flown:
         return _kept(planned, result)
     except OSError as error:
         return Flown(result, note=_unwritten(planned, error))
+
+
+def _judged(planned: Planned) -> ScenarioResult:
+    """The result of a run, whose folder is there.
+
+    Raises:
+        UserError: it cannot be flown; nothing is left in its place.
+    """
+    try:
+        return run_scenario(planned.scenario, planned.seed, folder=planned.folder, file=planned.file)
+    except UserError:
+        if planned.folder is not None:
+            shutil.rmtree(planned.folder)
+        raise
 
 
 def _kept(planned: Planned, result: ScenarioResult) -> Flown:

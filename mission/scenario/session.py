@@ -48,7 +48,8 @@ def scenario_session(
     _tell(flown, console)
     if junit is not None:
         try:
-            write_whole(junit, junit_text(results))
+            every = [each.result or run.refused(each.refusal) for run, each in zip(planned, flown, strict=True)]
+            write_whole(junit, junit_text(every))
         except OSError as error:
             raise UserError(f"--junit {junit}: cannot be written: {error.strerror}") from error
         print_line(console, f"JUnit: {junit}")

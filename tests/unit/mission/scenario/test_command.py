@@ -162,6 +162,21 @@ def test_a_script_that_takes_its_process_with_it_fails_alone(folder):
     assert emptied(died) == died  # the next run of it may be kept there
 
 
+def test_a_run_that_cannot_be_flown_is_an_error_of_junit_too_and_leaves_no_folder(folder):
+    (folder / "none.py").write_text("from math import nothing as fly\n")  # which only running it tells
+    (folder / "none.scenario.yaml").write_text("vehicle: {python: 'none.py:fly'}\n")
+    keep, junit = folder / "kept", folder / "junit.xml"
+    result = run(folder, "--seeds", 1, "--jobs", 2, "--keep", keep, "--junit", junit)
+    assert result.exit_code == 2
+    assert "cannot be flown: " in result.output
+    hop, none = ET.parse(junit).getroot()
+    assert (hop.get("name"), hop.get("errors")) == ("hop seed 1", "0")
+    assert (none.get("name"), none.get("tests"), none.get("errors")) == ("none seed 1", "1", "1")
+    (error,) = none.iter("error")
+    assert "none.py: cannot be imported: ImportError: " in error.get("message")
+    assert not list(keep.iterdir())
+
+
 def test_a_run_whose_logs_cannot_be_kept_is_one_sentence(folder):
     scenario, keep = read_scenario(folder / "hop.scenario.yaml"), folder / "kept"
     keep.write_text("no folder")
