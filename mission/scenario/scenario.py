@@ -149,6 +149,8 @@ class Vehicle(Part):
         orders = [name for name in ("plan", "script", "python") if getattr(self, name)]
         if len(orders) > 1:
             raise ValueError(f"{' and '.join(orders)}: choose one, a plan, a script or Python")
+        if self.count > 1 and "ne_m" in self.start.model_fields_set:
+            raise KeyRefusal(("start", "ne_m"), f"is one place for {self.count} vehicles: write each in vehicles")
         return self
 
 

@@ -201,9 +201,7 @@ def _placed(base: FlightConfig, scenario: Scenario, own: list[FlightConfig]) -> 
         raise KeyRefusal(("vehicles",), str(error).removeprefix("--vehicles: ")) from error
     fleet = []
     for config, mine, vehicle in zip(placed, own, scenario.fleet, strict=True):
-        has_place = (
-            vehicle.count == 1 and "start" in vehicle.model_fields_set and "ne_m" in vehicle.start.model_fields_set
-        )
+        has_place = "ne_m" in vehicle.start.model_fields_set
         fleet.append(
             mine.model_copy(
                 update={
@@ -230,6 +228,7 @@ class Built:
 
     def __init__(self, scenario: Scenario, seed: int, folder: Path | None) -> None:
         configs = flight_configs(scenario, seed)
+        check_starts(scenario, configs)
         self.stations = [GroundStation() for _ in configs] if scenario.has_ground_station else []
         links: list[Sequence[Link]] = [(station.vehicle_end,) for station in self.stations] or [()] * len(configs)
         self.companion: Any = None

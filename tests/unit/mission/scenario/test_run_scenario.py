@@ -257,6 +257,17 @@ def test_several_vehicles_are_judged_one_by_one_and_together(tmp_path):
     assert len(result.ulogs) == 3
 
 
+def test_vehicles_that_start_in_each_other_are_refused_with_any_seed():
+    vehicles = [{"start": {"ne_m": [5, 5]}}, {"start": {"ne_m": [5.5, 5]}}]
+    with pytest.raises(UserError, match=r"vehicles\[1\].start.ne_m: vehicles 1 and 2 start 0.5 m apart"):
+        run_scenario(Scenario.model_validate({"world": PLAIN, "vehicles": vehicles}), seed=7)
+
+
+def test_a_plan_that_is_not_there_is_an_error_of_the_script():
+    result = flown([{"fly_plan": "/none/round.plan"}])
+    assert result.error.startswith("step 1, fly_plan: /none/round.plan: ")
+
+
 def test_who_never_becomes_ready_says_why():
     result = flown(["arm"], vehicle={"start": {"battery": 0.05}})
     assert result.error == "ready to arm: nothing within 60 s: battery: 5% left, 15% needed"

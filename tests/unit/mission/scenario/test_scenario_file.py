@@ -153,6 +153,11 @@ def test_python_makes_the_same_scenario(tmp_path):
             "8: checks[0].following: distance_min_m 3 is above distance_max_m 2",
         ),
         ("- at_end", "- tilt: {max: 3}\n    from: 8\n    to: 5\n  - at_end", "8: checks[0]: from 8 is above to 5"),
+        (
+            "  script:\n",
+            "  count: 3\n  start:\n    ne_m: [0, 30]\n  script:\n",
+            "5: vehicle.start.ne_m: is one place for 3 vehicles: write each in vehicles",
+        ),
         ("about:", "vehicles: [{}]\nabout:", "1: vehicles: there is vehicle, too: choose one"),
         ("- at_end", "- tilt: {max: 3}\n    speed: {max: 3}\n  - at_end", "names speed and tilt: put each in an entry"),
     ],
