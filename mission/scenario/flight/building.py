@@ -22,11 +22,13 @@ from mission.flight_config import AIRFIELD, TREELESS_M, FlightConfig, OwnerConfi
 from mission.kernel_loading import load_kernels
 from mission.scenario.flight.checking import (
     airframe_of,
+    check_checks,
     check_faults,
     check_orders,
     check_parameters,
     check_purpose,
     check_starts,
+    check_steps,
 )
 from mission.scenario.parts.part import KeyRefusal
 from mission.scenario.scenario import Scenario, Vehicle, World
@@ -161,13 +163,15 @@ def check_scenario(scenario: Scenario, file: str, *, is_whole: bool = True) -> N
         is_whole: nobody tells the vehicles anything besides.
 
     Raises:
-        UserError: an airframe, parameter, plan, policy or function is not there, a fault is of a part that is not
-            there, or a vehicle starts where it cannot.
+        UserError: an airframe, parameter, plan, policy or function is not there, a step, a fault or a check is of what
+            a vehicle has not, or a vehicle starts where it cannot.
     """
     try:
         configs = flight_configs(scenario, scenario.seeds[0])
         check_orders(scenario)
+        check_steps(scenario, configs)
         check_faults(scenario, configs)
+        check_checks(scenario, configs)
         check_starts(scenario, configs)
         if is_whole:
             check_purpose(scenario)

@@ -370,6 +370,35 @@ def refused(text, tmp_path):
             "4: vehicle.start.ne_m: is outside of the world, which ends 100 m to each side of home",
         ),
         ("world: {size_m: 50}\nvehicles:\n  - count: 50\n", "2: vehicles: the world has free ground for"),
+        (
+            "vehicle:\n  script:\n    - arm\n    - let_policy_fly: 30\n",
+            "4: vehicle.script[1].let_policy_fly: the vehicle has no policy",
+        ),
+        ("vehicle:\n  script:\n    - policy_park: 3\n", "3: vehicle.script[0].policy_park: the vehicle has no policy"),
+        (
+            "vehicle:\n  policy: {name: Navigate}\n  script:\n    - let_policy_fly: 3\n",
+            "4: vehicle.script[0].let_policy_fly: there is nobody to follow; add an owner",
+        ),
+        (
+            "vehicle:\n  script:\n    - set_param:\n        MPC_LAND_SPEED: 1\n        MPC_XY_VEL_MAXX: 3\n",
+            "5: vehicle.script[0].set_param.MPC_XY_VEL_MAXX: unknown parameter; did you mean MPC_XY_VEL_MAX?",
+        ),
+        (
+            "vehicles:\n  - {}\n  - airframe: rover\n    script:\n      - arm\n      - takeoff: 5\n",
+            "6: vehicles[1].script[1].takeoff: rover drives, and takes off never",
+        ),
+        ("checks:\n  - airspeed: {min: 5}\n", "2: checks[0].airspeed: x500 measures no airspeed, which planes do"),
+        (
+            "vehicles: [{airframe: plane}, {airframe: rover}]\nchecks:\n  - airspeed: {min: 5}\n",
+            "3: checks[0].airspeed: rover measures no airspeed",
+        ),
+        ("checks:\n  - always: speed > 1 and airspeed > 5\n", "2: checks[0].always: x500 measures no airspeed"),
+        (
+            "faults:\n  - when: airspeed > 5\n    battery: 0.1\n",
+            "2: faults[0].when: x500 measures no airspeed, which planes do",
+        ),
+        ("checks:\n  - separation: 5\n", "2: checks[0].separation: there is one vehicle"),
+        ("checks:\n  - following: {in_view_min: 0.5}\n", "2: checks[0].following: the vehicle has no policy"),
     ],
 )
 def test_what_cannot_be_flown_is_refused_before_with_its_place(tmp_path, text, said):
@@ -389,6 +418,8 @@ def test_what_cannot_be_flown_is_refused_before_with_its_place(tmp_path, text, s
         "vehicles: [{start: {ne_m: [5, 5]}}, {start: {ne_m: [5, 6]}}]\nworld: {size_m: 50}\n" + AT_REST,
         "vehicle: {start: {ne_m: [100, -100]}}\nworld: {size_m: 200}\n" + AT_REST,
         "checks: [{altitude: {min: 5, max: 5}}]\n",
+        "vehicles: [{airframe: plane}, {airframe: rover}]\nchecks: [{airspeed: {min: 5}, vehicle: 1}]\n",
+        "vehicle: {airframe: rover, script: [{takeoff: 5}]}\nfails_with: takeoff\n",
     ],
 )
 def test_what_can_be_flown_is_not_refused(tmp_path, text):
