@@ -17,6 +17,9 @@ def duration(seen: Seen, check: c.Check, asked: c.Duration) -> Judged:
     start_s, end_s = seen.ends(check)
     took = np.array([min(end_s, seen.end_s) - start_s])
     at = np.array([min(end_s, seen.end_s)])
+    if check.during is not None:  # however often it was in that mode
+        frames = seen.frames(check)
+        took, at = np.diff(seen.time_s, prepend=0.0)[frames].sum(keepdims=True), seen.time_s[frames][-1:]
     if asked.min_s is not None:
         yield least("least", took, at, asked.min_s, "s", what="duration")
     if asked.max_s is not None:
@@ -44,9 +47,8 @@ def modes(seen: Seen, check: c.Check, asked: c.Modes) -> Judged:
 
 
 def _texts(seen: Seen, check: c.Check, text: str) -> list[tuple[float, str]]:
-    start_s, end_s = seen.ends(check)
-    said = seen.vehicle.witness.texts
-    return [(at, each) for at, each in said if start_s <= at <= end_s and text.lower() in each.lower()]
+    said = seen.happened(check, seen.vehicle.witness.texts)
+    return [(at, each) for at, each in said if text.lower() in each.lower()]
 
 
 def heard(seen: Seen, check: c.Check, asked: c.Heard) -> Judged:
@@ -115,8 +117,7 @@ def _yes(name: str, *, is_it: bool) -> str:
 
 def reached(seen: Seen, check: c.Check, asked: c.Reached) -> Judged:
     """Which items of its mission it reached."""
-    start_s, end_s = seen.ends(check)
-    found = [at for at, seq in seen.vehicle.witness.reached if seq == asked.item and start_s <= at <= end_s]
+    found = [at for at, seq in seen.happened(check, seen.vehicle.witness.reached) if seq == asked.item]
     others = ", ".join(str(seq) for _, seq in seen.vehicle.witness.reached) or "none"
     happened = f"at {found[0]:.1f} s" if found else f"never; reached: {others}"
     yield CheckResult(
@@ -163,21 +164,19 @@ def once(seen: Seen, check: c.Check, asked: c.Once) -> Judged:
 
 def no_contact(seen: Seen, check: c.Check, asked: c.NoContact) -> Judged:
     """What it touched."""
-    start_s, end_s = seen.ends(check)
-    touches = [(at, speed) for at, speed, is_ground in seen.vehicle.witness.touches
-               if not is_ground and start_s <= at <= end_s]  # fmt: skip
+    happened = seen.happened(check, seen.vehicle.witness.touches)
+    touches = [(at, speed) for at, speed, is_ground in happened if not is_ground]
     at, speed = max(touches, key=lambda touch: touch[1], default=(nan, 0.0))
-    happened = f"{speed:.2g} m/s at {at:.1f} s" if touches else "none"
+    shown = f"{speed:.2g} m/s at {at:.1f} s" if touches else "none"
     asked_text = f"touches at most {asked.max_m_s:g} m/s hard" if asked.max_m_s > 0.0 else "touches nothing"
     margin = asked.max_m_s - speed
-    yield CheckResult("contact", margin >= 0.0, asked_text, happened, margin, "m/s", at)
+    yield CheckResult("contact", margin >= 0.0, asked_text, shown, margin, "m/s", at)
 
 
 def touch_down(seen: Seen, check: c.Check, asked: c.TouchDown) -> Judged:
     """How hard it touched the ground."""
-    start_s, end_s = seen.ends(check)
-    touches = [(at, speed) for at, speed, is_ground in seen.vehicle.witness.touches
-               if is_ground and max(start_s, seen.first_flown_s) <= at <= end_s]  # fmt: skip
+    happened = seen.happened(check, seen.vehicle.witness.touches)
+    touches = [(at, speed) for at, speed, is_ground in happened if is_ground and at >= seen.first_flown_s]
     if not touches:
         never = isinf(seen.first_flown_s)
         raise NothingToJudge("it never flew" if never else "it never touched the ground after it flew")

@@ -26,7 +26,7 @@ def judge(run: Run, histories: Sequence[History], end_s: float) -> tuple[CheckRe
     found: list[CheckResult] = []
     for check in run.scenario.checks:
         is_of_all = check.name_chosen == "separation"
-        looked = flown[:1] if is_of_all else [flown[check.vehicle - 1]] if check.vehicle is not None else flown
+        looked = [flown[(check.vehicle or 1) - 1]] if is_of_all or check.vehicle is not None else flown
         for seen in looked:
             who = f"vehicle {seen.vehicle.number}: " if len(flown) > 1 and not is_of_all else ""
             found += [replace(result, name=f"{who}{result.name}") for result in _results(seen, check)]

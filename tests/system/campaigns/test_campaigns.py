@@ -123,7 +123,7 @@ def test_a_run_that_crashes_or_hangs_is_a_finding(tmp_path):
     errors = {run["values"]["wind.speed_m_s"]: run["error"] for run in runs_in(tmp_path / "out")}
     assert errors == {
         0.0: "",
-        1.0: "its process was ended by SIGSEGV",
+        1.0: "its process died (signal 11, Segmentation fault)",
         2.0: "hung: its process was ended after 20 s",
     }
     assert "not met" in result.output
