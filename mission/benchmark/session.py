@@ -15,7 +15,7 @@ from rich.table import Table
 
 from common.files import write_whole
 from common.pool_worker import end_with_parent
-from mission.benchmark.benchmark import FIRST_SEED, benchmark_of
+from mission.benchmark.benchmark import FIRST_SEED, Benchmark, benchmark_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,14 +70,17 @@ def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
     rows = [benchmark.row(name, outcomes[name]) for name in names]
     console.print(_shown(benchmark.columns, rows))
     if options.out is not None:
-        _write(options.out, options, markdown(benchmark.columns, rows), outcomes)
+        _write(options.out, options, _page(benchmark, rows, outcomes), outcomes)
         console.print(f"table and flights: {options.out}")
     return outcomes
 
 
 def misses(task: str, outcomes: dict[str, list[Any]]) -> list[str]:
-    """What fell short of the conditions' own bounds, a sentence each."""
-    benchmark = benchmark_of(task)
+    """What fell short of what is wanted, a sentence each."""
+    return _misses(benchmark_of(task), outcomes)
+
+
+def _misses(benchmark: Benchmark, outcomes: dict[str, list[Any]]) -> list[str]:
     return [text for name, flown in outcomes.items() for text in benchmark.misses(name, flown)]
 
 
@@ -105,9 +108,16 @@ def markdown(columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
     return "\n".join([head, *("| " + " | ".join(cells) + " |" for cells in rows)]) + "\n"
 
 
-def _write(out: Path, options: BenchmarkOptions, table: str, outcomes: dict[str, list[Any]]) -> None:
+def _page(benchmark: Benchmark, rows: Sequence[tuple[str, ...]], outcomes: dict[str, list[Any]]) -> str:
+    """The table, and below it what was missed."""
+    missed = _misses(benchmark, outcomes)
+    below = "".join(f"- {text}\n" for text in missed)
+    return markdown(benchmark.columns, rows) + (f"\nMissed:\n\n{below}" if missed else "")
+
+
+def _write(out: Path, options: BenchmarkOptions, page: str, outcomes: dict[str, list[Any]]) -> None:
     out.mkdir(parents=True, exist_ok=True)
-    write_whole(out / "table.md", table.encode())
+    write_whole(out / "table.md", page.encode())
     flown = {name: [asdict(outcome) for outcome in found] for name, found in outcomes.items()}
     names = ("task", "policy", "has_guard", "seed")
     record = {name: getattr(options, name) for name in names} | {"flights": flown}
