@@ -110,6 +110,8 @@ class Run:
     """What judges how the policy follows, once it does."""
     figures: dict[str, float] = field(default_factory=dict)
     """Measured on the way, for the result."""
+    measured_s: dict[str, float] = field(default_factory=dict)
+    """When each of them was: simulated time [s]."""
     events: list[tuple[float, int, str]] = field(default_factory=list)
     """What the scenario did, faults and marks: simulated time [s], number of the vehicle (0: of all), in words."""
 
@@ -135,6 +137,11 @@ class Run:
         if name not in self.marks:
             self.marks[name] = self.time_s
             self.note(f"mark: {name}")
+
+    def measure(self, **figures: float) -> None:
+        """Keeps figures of this moment; of a name the last counts."""
+        self.figures |= figures
+        self.measured_s |= dict.fromkeys(figures, self.time_s)
 
     def note(self, text: str, vehicle: int = 0) -> None:
         """Something that the scenario did now."""

@@ -233,3 +233,25 @@ def busiest_s(time_s: Rows) -> float:
         return nan
     just_before = np.arange(len(time_s)) - np.searchsorted(time_s, time_s - BUSY_S)
     return float(time_s[int(np.argmax(just_before))])
+
+
+MEASURED = {
+    "park_distance_m": ("park distance", "m"),
+    "park_turn_deg": ("park turn", "deg"),
+    "park_s": ("park time", "s"),
+    "policy_goto_s": ("goto time", "s"),
+}
+
+
+def figures(seen: Seen, _: c.Check, asked: dict[c.MeasuredName, c.Range]) -> Judged:
+    """What its policy's steps have measured."""
+    run = seen.run
+    for name, bounds in asked.items():
+        title, unit = MEASURED[name]
+        if name not in run.figures:
+            raise NothingToJudge(f"{name} was never measured")
+        value, at = np.array([run.figures[name]]), np.array([run.measured_s[name]])
+        if bounds.min is not None:
+            yield least(title, value, at, bounds.min, unit)
+        if bounds.max is not None:
+            yield most(title, value, at, bounds.max, unit)

@@ -220,6 +220,9 @@ FigureName = Literal[
 ]  # fmt: skip
 
 
+MeasuredName = Literal["park_distance_m", "park_turn_deg", "park_s", "policy_goto_s"]
+
+
 class Interventions(Short):
     """The guard changes the policy's decisions at most so often."""
 
@@ -278,6 +281,9 @@ class Check(OneOf):
     scorecard: dict[FigureName, Range] | None = None
     """Figures of the scorecard of FollowMe, as `honeyguide follow` shows them, each with its bounds."""
     interventions: Interventions | None = None
+    figures: dict[MeasuredName, Range] | None = None
+    """What `policy_park` and `policy_goto` have measured, each with its bounds: how far from the middle of its spot it
+    stood, how far it was turned, how long it took. Of several such steps the last counts."""
 
     @property
     def title(self) -> str:

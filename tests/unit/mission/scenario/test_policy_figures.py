@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from common.intervals import Interval
-from mission.scenario.judging.event_checks import BUSY_S, busiest_s
+from mission.scenario.judging.event_checks import BUSY_S, MEASURED, busiest_s
 from mission.scenario.judging.policy_figures import following_figures, scorecard_figures
-from mission.scenario.parts.checks import Check, FigureName
+from mission.scenario.parts.checks import Check, FigureName, MeasuredName
 from mission.scenario.runner import AFTER_S, run_scenario
 from mission.scenario.scenario import Scenario
 from policies.tasks.follow_me.scorecard import Scorecard
@@ -114,6 +114,7 @@ def follow_flight():
             {"following": {"distance_min_m": 0.5, "distance_max_m": 30}},
             {"scorecard": {"distance_median_m": {"max": 30}}},
             {"interventions": 10_000},
+            {"figures": {"park_s": {"max": 30}}},
         ],
     }
     return run_scenario(Scenario.model_validate(scenario))
@@ -130,5 +131,29 @@ def test_moments_are_of_simulated_time(follow_flight):
     assert not changed.worst_s < begun_s - 1.0
 
 
+def test_a_figure_that_no_step_has_measured_fails(follow_flight):
+    figure = results(follow_flight.checks)["figures"]
+    assert (figure.asked, figure.happened) == ("park_s max 30", "park_s was never measured")
+    assert not figure.passed
+
+
+def test_figures_have_bounds_and_the_moment_when_they_were_measured(tmp_path):
+    (tmp_path / "parks.py").write_text(
+        "async def parks(drone, run):\n    await drone.sleep(3.0)\n"
+        "    run.measure(park_distance_m=0.25, policy_goto_s=12.0)\n    await drone.sleep(2.0)\n"
+    )
+    checks = [{"figures": {"park_distance_m": {"max": 0.2}, "policy_goto_s": {"min": 10, "max": 30}}}]
+    given = {"vehicle": {"python": f"{tmp_path / 'parks.py'}:parks"}, "checks": checks}
+    found = run_scenario(Scenario.model_validate(given)).checks
+    assert [(each.name, each.passed, each.asked) for each in found] == [
+        ("figures: park distance", False, "park distance at most 0.2 m"),
+        ("figures: goto time", True, "goto time at least 10 s"),
+        ("figures: goto time", True, "goto time at most 30 s"),
+    ]
+    assert found[0].happened == "0.25 m at 3.0 s"
+    assert [each.margin for each in found] == pytest.approx([-0.05, 2.0, 18.0])
+
+
 def test_names_are_those_of_what_is_measured():
     assert set(get_args(FigureName)) == {each.name for each in fields(Scorecard) if each.type is Interval}
+    assert set(get_args(MeasuredName)) == MEASURED.keys()

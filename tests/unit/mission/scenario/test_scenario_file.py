@@ -135,6 +135,11 @@ def test_python_makes_the_same_scenario(tmp_path):
         ),
         (
             "at_end: {is_armed: false}",
+            "figures: {park_seconds: {max: 5}}",
+            "8: checks[0].figures.park_seconds: must be park_distance_m, park_turn_deg, park_s or policy_goto_s, not",
+        ),
+        (
+            "at_end: {is_armed: false}",
             "duration: {min_s: 10, max_s: 5}",
             "8: checks[0].duration: min_s 10 is above max_s 5",
         ),
