@@ -11,6 +11,7 @@ from common.airframe import load_airframe
 from common.params import Parameter
 from docs.generate.conditions_page import conditions_text
 from docs.generate.foxglove_page import foxglove_text
+from docs.generate.guard_page import guard_text
 from docs.generate.mavlink_page import mavlink_text
 from docs.generate.tasks_page import tasks_text
 from docs.generate.training_page import training_text
@@ -110,6 +111,7 @@ def generated_pages() -> dict[Path, str]:
         REFERENCE / "training-config.md": training_text(),
         REFERENCE / "tasks.md": tasks_text(),
         REFERENCE / "follow-conditions.md": conditions_text(),
+        REFERENCE / "guard-settings.md": guard_text(),
         REFERENCE / "world-file.md": world_text(),
         REFERENCE / "scenario-keys.md": reference_text(),
         REFERENCE / "scenario.schema.json": schema_text(),

@@ -11,8 +11,8 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.skills.following import Pilot
 
 
-def _flown(pilot: Pilot, condition: str, seed: int, has_guard: bool) -> Outcome:
-    return fly(pilot, BY_NAME[condition], seed, GuardSettings(is_on=has_guard))
+def _flown(pilot: Pilot, condition: str, seed: int, guard: GuardSettings) -> Outcome:
+    return fly(pilot, BY_NAME[condition], seed, guard)
 
 
 def _row(name: str, outcomes: Sequence[Outcome]) -> tuple[str, ...]:
