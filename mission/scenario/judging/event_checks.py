@@ -1,6 +1,7 @@
 """Checks of what happens: time, modes, texts, charge, the end, conditions, touches, and how a policy does."""
 
 from math import isfinite, isinf, nan
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from mission.scenario.judging.seen import Judged, NothingToJudge, Rows, Seen, le
 from mission.scenario.parts import checks as c
 from mission.scenario.parts.conditions import QUANTITIES, Term, terms_of
 from mission.scenario.result import CheckResult
+
+BUSY_S = 10.0  # within which the most interventions are looked for
 
 
 def duration(seen: Seen, check: c.Check, asked: c.Duration) -> Judged:
@@ -189,21 +192,24 @@ def following(seen: Seen, check: c.Check, asked: c.Following) -> Judged:
     del check
     from mission.scenario.judging.policy_figures import following_figures
 
-    track = None if seen.run.watch is None else seen.run.watch.track()
-    if track is None:
-        raise NothingToJudge("no policy followed")
-    yield from following_figures(track, asked)
+    yield from following_figures(*_followed(seen), asked)
 
 
-def scorecard(seen: Seen, check: c.Check, asked: dict[str, c.Range]) -> Judged:
+def scorecard(seen: Seen, check: c.Check, asked: dict[c.FigureName, c.Range]) -> Judged:
     """Figures of the scorecard."""
     del check
     from mission.scenario.judging.policy_figures import scorecard_figures
 
-    track = None if seen.run.watch is None else seen.run.watch.track()
+    yield from scorecard_figures(*_followed(seen), asked)
+
+
+def _followed(seen: Seen) -> tuple[Any, Rows]:
+    """The track, and the simulated time of each of its samples."""
+    watch = seen.run.watch
+    track = None if watch is None else watch.track()
     if track is None:
         raise NothingToJudge("no policy followed")
-    yield from scorecard_figures(track, asked)
+    return track, watch.sampled_s
 
 
 def interventions(seen: Seen, _: c.Check, asked: c.Interventions) -> Judged:
@@ -211,7 +217,40 @@ def interventions(seen: Seen, _: c.Check, asked: c.Interventions) -> Judged:
     companion = seen.run.companion
     if companion is None:
         raise NothingToJudge("no policy flew")
-    per_min = 60.0 * sum((companion.skill.interventions or {}).values()) / max(seen.end_s, 1.0)
+    time_s = np.array(seen.vehicle.witness.changes)
+    per_min = 60.0 * len(time_s) / max(seen.end_s, 1.0)
     margin = asked.max_per_min - per_min
-    yield CheckResult("interventions", margin >= 0.0, f"at most {asked.max_per_min:g} per minute", f"{per_min:.3g}",
-                      margin, "/min")  # fmt: skip
+    worst_s = busiest_s(time_s)
+    happened = f"{per_min:.3g}" + (f", most by {worst_s:.1f} s" if len(time_s) else "")
+    yield CheckResult("interventions", margin >= 0.0, f"at most {asked.max_per_min:g} per minute", happened,
+                      margin, "/min", worst_s)  # fmt: skip
+
+
+def busiest_s(time_s: Rows) -> float:
+    """When the most of some moments, in order, had come within ten seconds; NaN: there are none."""
+    if not len(time_s):
+        return nan
+    just_before = np.arange(len(time_s)) - np.searchsorted(time_s, time_s - BUSY_S)
+    return float(time_s[int(np.argmax(just_before))])
+
+
+MEASURED = {
+    "park_distance_m": ("park distance", "m"),
+    "park_turn_deg": ("park turn", "deg"),
+    "park_s": ("park time", "s"),
+    "policy_goto_s": ("goto time", "s"),
+}
+
+
+def figures(seen: Seen, _: c.Check, asked: dict[c.MeasuredName, c.Range]) -> Judged:
+    """What its policy's steps have measured."""
+    run = seen.run
+    for name, bounds in asked.items():
+        title, unit = MEASURED[name]
+        if name not in run.figures:
+            raise NothingToJudge(f"{name} was never measured")
+        value, at = np.array([run.figures[name]]), np.array([run.measured_s[name]])
+        if bounds.min is not None:
+            yield least(title, value, at, bounds.min, unit)
+        if bounds.max is not None:
+            yield most(title, value, at, bounds.max, unit)

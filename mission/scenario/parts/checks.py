@@ -251,6 +251,9 @@ FigureName = Literal[
 ]  # fmt: skip
 
 
+MeasuredName = Literal["park_distance_m", "park_turn_deg", "park_s", "policy_goto_s"]
+
+
 class Interventions(Short):
     """The guard changes the policy's decisions at most so often."""
 
@@ -313,6 +316,9 @@ class Check(OneOf):
     scorecard: dict[FigureName, Range] | None = Field(default=None, min_length=1)
     """Figures of the scorecard of FollowMe, as `honeyguide follow` shows them, each with its bounds."""
     interventions: Interventions | None = None
+    figures: dict[MeasuredName, Range] | None = None
+    """What `policy_park` and `policy_goto` have measured, each with its bounds: how far from the middle of its spot it
+    stood, how far it was turned, how long it took. Of several such steps the last counts."""
 
     @property
     def title(self) -> str:

@@ -2,7 +2,6 @@
 
 import pickle
 import shutil
-from dataclasses import fields
 from pathlib import Path
 from typing import get_args
 
@@ -12,19 +11,17 @@ from PIL import Image
 
 import common.airframes
 from autopilot.interface.vehicle_state import Mode
-from common.intervals import Interval
 from mission.console.option_checks import UserError
 from mission.flight_settings import WORLD_KINDS
 from mission.scenario.flight.building import check_scenario, flight_configs
 from mission.scenario.flight.flying import ACTIONS
 from mission.scenario.judging.judge import JUDGES
 from mission.scenario.keeping import keep_scenario
-from mission.scenario.parts.checks import Check, FigureName
+from mission.scenario.parts.checks import Check
 from mission.scenario.parts.faults import SensorName
 from mission.scenario.parts.steps import ModeName, Step, Takeoff
 from mission.scenario.scenario import Scenario, World, WorldName
 from mission.scenario.scenario_file import READY, find_files, parse_scenario, read_scenario
-from policies.tasks.follow_me.scorecard import Scorecard
 from sim.faults import BIAS_UNITS
 from sim.world.world import WorldConfig
 
@@ -159,6 +156,11 @@ def test_python_makes_the_same_scenario(tmp_path):
         ),
         (
             "at_end: {is_armed: false}",
+            "figures: {park_seconds: {max: 5}}",
+            "8: checks[0].figures.park_seconds: must be park_distance_m, park_turn_deg, park_s or policy_goto_s, not",
+        ),
+        (
+            "at_end: {is_armed: false}",
             "duration: {min_s: 10, max_s: 5}",
             "8: checks[0].duration: min_s 10 is above max_s 5",
         ),
@@ -290,7 +292,6 @@ def test_names_are_those_of_the_parts_that_do_it():
     assert set(get_args(ModeName)) == {mode.name.lower() for mode in Mode}
     assert set(Step.names()) == ACTIONS.keys()
     assert set(Check.names()) == JUDGES.keys()
-    assert set(get_args(FigureName)) == {each.name for each in fields(Scorecard) if each.type is Interval}
     assert set(WORLD_KINDS) < set(get_args(WorldName))
 
 
