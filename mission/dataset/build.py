@@ -60,6 +60,7 @@ def build_dataset(options: BuildOptions, console: Console) -> None:
         episodes = hover_episodes(logs, task)
     else:
         judge = judge_of(task)
+        _refuse_telemetry(logs)
         by_truth = options.has_truth and all(map(has_truth, logs))
         origin = DatasetOrigin(
             task.layout,
@@ -91,14 +92,18 @@ def _numbers(pairs: tuple[str, ...]) -> dict[str, float]:
     return numbers
 
 
+def _refuse_telemetry(logs: list[Path]) -> None:
+    for log in logs:
+        if log.suffix == ".tlog":
+            raise DatasetError(f"{log}: a .tlog holds no topic policy_decision; build from the run's .ulg")
+
+
 def _read(log: Path, judge: Judge, *, by_truth: bool) -> FlightSource:
     """A log of the judge's task.
 
     Raises:
         DatasetError: it cannot be read, or holds decisions of another task, version or setting.
     """
-    if log.suffix == ".tlog":
-        raise DatasetError(f"{log}: a .tlog holds no topic policy_decision; build from the run's .ulg")
     source = read_flight(log, by_truth=by_truth)
     try:
         replace(judge.layout, stack=1).require(source.rows.layout, f"{log}: policy_decision")
