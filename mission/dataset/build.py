@@ -14,7 +14,7 @@ from mission.console.terminal import print_line
 from mission.dataset.sources import FlightSource, has_truth, logs_at, read_flight
 from mission.train.task_arguments import task_of
 from policies.datasets.decisions import Judge, episodes_of, runs_of
-from policies.datasets.episodes import DatasetError, DatasetOrigin, EpisodeRows
+from policies.datasets.episodes import NUMBER_NOTE, DatasetError, DatasetOrigin, EpisodeRows
 from policies.datasets.judges import HOVER, judge_of, task_pairs
 from policies.datasets.writer import DatasetWriter
 from policies.experts.demonstration_file import check_is_free
@@ -50,7 +50,7 @@ def build_dataset(options: BuildOptions, console: Console) -> None:
     task, settings = task_of(options.task, pairs, 1)
     numbers = _numbers(options.numbers)
     task.set_params(numbers)
-    notes = {f"number {name}": f"{value:g}" for name, value in numbers.items()}
+    notes = {f"{NUMBER_NOTE}{name}": f"{value:g}" for name, value in numbers.items()}
     if options.task == HOVER:
         from mission.dataset.build_hover import hover_episodes
 

@@ -35,8 +35,9 @@ def episode(steps=5, seed=0, **more):
     )
 
 
-def written(folder, seeds=(0, 1, 2), layout=LAYOUT):
-    with DatasetWriter(folder, DatasetOrigin(layout, {"preset": "improved"}, "test")) as writer:
+def written(folder, seeds=(0, 1, 2), layout=LAYOUT, notes=None, **settings):
+    origin = DatasetOrigin(layout, {"preset": "improved"} | settings, "test", notes=notes or {})
+    with DatasetWriter(folder, origin) as writer:
         writer.add_all(episode(5 + seed, seed) for seed in seeds)
     return folder
 
@@ -121,6 +122,30 @@ def test_another_version_is_not_merged(tmp_path):
     with pytest.raises(LayoutError, match="other: made for another task or preset: layout version is 2 there"):
         merge([one, other], tmp_path / "both")
     assert not (tmp_path / "both").exists()
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "sentence"),
+    [
+        ({"preset": "reach"}, {"preset": "park"}, "preset is park there and reach here"),
+        ({"reward": ""}, {"reward": "progress"}, "reward is progress there and as the preset has it here"),
+        ({"notes": {"number kept_m": "4"}}, {}, "number kept_m is the task's own there and 4 here"),
+    ],
+)
+def test_what_was_recorded_with_other_settings_is_not_merged(tmp_path, one, other, sentence):
+    one, other = written(tmp_path / "one", **one), written(tmp_path / "other", **other)
+    with pytest.raises(DatasetError) as refused:
+        merge([one, other], tmp_path / "both")
+    assert str(refused.value) == f"{other}: recorded with other settings than {one}: {sentence}"
+    assert not (tmp_path / "both").exists()
+
+
+def test_conditions_may_differ_and_are_noted(tmp_path):
+    one = written(tmp_path / "one", has_estimator=True, split="train", notes={"from": "here"})
+    other = written(tmp_path / "other", (3,), has_estimator=False, split="train", notes={"by": "hand"})
+    assert merge([one, other], tmp_path / "both") == 4
+    with DatasetReader(tmp_path / "both") as reader:
+        assert reader.origin.notes == {"from": "here", "by": "hand", "setting has_estimator": "True, False"}
 
 
 def test_a_filter_keeps_what_passes_and_refuses_to_keep_nothing(tmp_path):
