@@ -71,8 +71,10 @@ def split(source: Path, fraction: float, seed: int, folders: tuple[Path, Path]) 
     """Two datasets: a fraction of the episodes, drawn by the seed, and the others; returns how many each has.
 
     Raises:
-        DatasetError: one of them would have none, or it cannot be read or written.
+        DatasetError: one of them would have none, both are the same, or it cannot be read or written.
     """
+    if folders[0].resolve() == folders[1].resolve():
+        raise DatasetError(f"{folders[1]}: a split makes two folders, and this one is named twice")
     with DatasetReader(source) as reader:
         first = round(fraction * reader.count)
         if not 0 < first < reader.count:

@@ -1,5 +1,7 @@
 """Datasets on disk: the same bytes for the same episodes, whole or not at all, and what is made of them."""
 
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
@@ -160,6 +162,15 @@ def test_a_split_that_leaves_a_part_empty_is_refused(tmp_path):
     whole = written(tmp_path / "whole")
     with pytest.raises(DatasetError, match="leaves one part without any"):
         split(whole, 0.01, 0, (tmp_path / "a", tmp_path / "b"))
+
+
+def test_a_split_into_one_folder_is_refused_before_anything_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    whole = written(tmp_path / "whole")
+    for twice in ((Path("part"), Path("part")), (Path("part"), tmp_path / "part")):
+        with pytest.raises(DatasetError, match="part: a split makes two folders, and this one is named twice"):
+            split(whole, 0.5, 0, twice)
+    assert [path.name for path in tmp_path.iterdir()] == ["whole"]
 
 
 def test_a_folder_that_is_no_dataset_is_refused(tmp_path):
