@@ -11,7 +11,8 @@ from pathlib import Path
 from rich.console import Console
 
 from mission.console.terminal import print_line
-from mission.dataset.sources import FlightSource, has_truth, logs_at, read_flight
+from mission.dataset.source_logs import DAMAGED, damaged, logs_at, refuse_twice
+from mission.dataset.sources import FlightSource, has_truth, read_flight
 from mission.train.task_arguments import task_of
 from policies.datasets.decisions import Judge, episodes_of, runs_of
 from policies.datasets.episodes import NUMBER_NOTE, DatasetError, DatasetOrigin, EpisodeRows
@@ -47,10 +48,16 @@ def build_dataset(options: BuildOptions, console: Console) -> None:
     check_is_free(options.out)
     pairs = task_pairs(options.task, options.env_args)
     logs = [log for source in options.sources for log in logs_at(source)]
+    refuse_twice(logs)
     task, settings = task_of(options.task, pairs, 1)
     numbers = _numbers(options.numbers)
     task.set_params(numbers)
     notes = {f"{NUMBER_NOTE}{name}": f"{value:g}" for name, value in numbers.items()}
+    if options.task != HOVER:
+        _refuse_telemetry(logs)
+    for log in damaged(logs):
+        print_line(console, f"{log}: {DAMAGED}")
+        notes[f"log {log.absolute().parent.name}/{log.name}"] = DAMAGED
     if options.task == HOVER:
         from mission.dataset.build_hover import hover_episodes
 
@@ -60,7 +67,6 @@ def build_dataset(options: BuildOptions, console: Console) -> None:
         episodes = hover_episodes(logs, task)
     else:
         judge = judge_of(task)
-        _refuse_telemetry(logs)
         by_truth = options.has_truth and all(map(has_truth, logs))
         origin = DatasetOrigin(
             task.layout,
