@@ -161,3 +161,4 @@ app.command(context_settings={"allow_extra_args": True})(training_commands.train
 app.command(name="eval")(training_commands.evaluate)
 app.add_typer(dataset_commands.app, name="dataset")
 app.command()(training_commands.export)
+app.command()(training_commands.card)

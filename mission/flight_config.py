@@ -37,7 +37,8 @@ class OwnerConfig(BaseModel):
     """How far north of home they wait."""
     numbers: dict[str, float] = Field(default_factory=dict)
     """Of FollowMe, by name, that hold for a flight too: how the owner and others walk and look, the phone, the camera,
-    what happens to pictures on their way. The others are at the task's defaults."""
+    what happens to pictures on their way, and to setpoints of a companion on board. The others are at the task's
+    defaults."""
 
 
 class FlightConfig(FlightSettings):

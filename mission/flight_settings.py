@@ -20,6 +20,7 @@ WORLD_KINDS = ("hills", "forest", "walled-forest", "course", "car-park")
 WORLD_FILES = (".yaml", ".yml")
 OURS: tuple[BoardName, ...] = ("own", "betaflight")
 """Under these it is our own flight controller that flies, with its options, parameters and links."""
+_GUARD_SETTING = "Sets a number of the guard: NAME=VALUE (docs/reference/guard-settings.md). Repeatable."
 _HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
 
 
@@ -140,6 +141,7 @@ class FollowOptions(FlightOptions):
     hill_height_m: float = option(8.0, "Height of the hills [m]; trained on 8.", "--hills", ge=0.0, le=300.0)
     airframe: str = option("x500", "Airframe name or TOML file; policies were trained on x500 and rover.")
     has_guard: bool = option(True, "A guard that does not believe the policy bounds it.", "--guard/--no-guard")
+    guard_settings: tuple[str, ...] = option((), _GUARD_SETTING, "--guard-setting")
     is_recorded: bool = option(
         False, "Keep each decision, with its picture, for a dataset (honeyguide dataset build).", "--record"
     )
@@ -149,9 +151,8 @@ class FollowOptions(FlightOptions):
 FOLLOWED_WITH = (
     "policy", "owner", "seconds", "speed", "seed", "wind_m_s", "wind_from_deg", "noise", "world_seed", "trees_per_ha",
     "hill_height_m", "airframe", "dialect", "engine", "board", "command", "instance", "parameters", "has_guard",
-    "is_recorded", "has_view", "view_port", "has_film", "has_mcap", "has_foxglove", "foxglove_port", "gcs_port",
-    "api_port", "host",
-    "run_folder",
+    "guard_settings", "is_recorded", "has_view", "view_port", "has_film", "has_mcap", "has_foxglove", "foxglove_port",
+    "gcs_port", "api_port", "host", "run_folder",
 )  # fmt: skip
 
 
@@ -164,6 +165,7 @@ class ParkOptions(FlightOptions):
     is_idle: bool = option(False, "Park nowhere by itself: wait for clicks on the page, and for gotos.", "--idle")
     airframe: str = option("rover", "Airframe name or TOML file; the policies were trained on rover.")
     has_guard: bool = option(True, "A guard that does not believe the policy bounds it.", "--guard/--no-guard")
+    guard_settings: tuple[str, ...] = option((), _GUARD_SETTING, "--guard-setting")
     is_recorded: bool = option(False, "Keep each decision for a dataset (honeyguide dataset build).", "--record")
     world_kind: str = "car-park"
     has_lidar: bool = True
@@ -172,6 +174,6 @@ class ParkOptions(FlightOptions):
 
 PARKED_WITH = (
     "policy", "spot", "is_reverse", "is_idle", "speed", "seconds", "seed", "wind_m_s", "wind_from_deg", "noise",
-    "world_seed", "airframe", "parameters", "has_guard", "is_recorded", "has_view", "view_port", "has_mcap",
-    "has_foxglove", "foxglove_port", "gcs_port", "api_port", "host", "run_folder",
+    "world_seed", "airframe", "parameters", "has_guard", "guard_settings", "is_recorded", "has_view", "view_port",
+    "has_mcap", "has_foxglove", "foxglove_port", "gcs_port", "api_port", "host", "run_folder",
 )  # fmt: skip

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bench.follow.judge import first_episodes
-from mission.follow.benchmark.conditions import BY_NAME
+from mission.follow.benchmark.conditions import AIRFRAME, BY_NAME
 from policies.learn.export.policy_file import load_policy
 from policies.tasks.follow_me.follow_me import FollowMe
 from policies.tasks.follow_me.follow_me_params import FOLLOW_PARAMS, SEEN_BY_TRACKER
@@ -26,23 +26,30 @@ EPISODES = 96
 _COSTS = ("_cost", "_reward", "_width_m", "_width_deg")
 _USUAL = {n.name: n.default for n in FOLLOW_PARAMS if n.name in SEEN_BY_TRACKER and not n.name.endswith(_COSTS)}
 _AIR = {"wind_m_s": 4.0, "wind_gust_m_s": 1.5, "trees_per_ha": 100.0}
+_IN_BATCH = [name for name, condition in BY_NAME.items() if condition.airframe == AIRFRAME]  # what training has
 _SPEEDS_M_S = {"walk": WALK_SPEED_M_S, "run": RUN_SPEED_M_S}
 
 
 def main(
     policies: list[Path],
-    condition: Annotated[list[str] | None, typer.Option(help="Default: all without hiding.")] = None,
+    condition: Annotated[
+        list[str] | None, typer.Option(help="Default: all without hiding, by the usual airframe.")
+    ] = None,
     *,
     guard: Annotated[bool, typer.Option(help="Under the guard's rules of the owner; not of trees.")] = True,
 ) -> None:
-    names = condition or [name for name in BY_NAME if not name.startswith("gone")]
+    names = condition or [name for name in _IN_BATCH if not name.startswith("gone")]
+    unknown = [name for name in names if name not in _IN_BATCH]
+    if unknown:
+        raise typer.BadParameter(f"{unknown[0]}: in batch there are {', '.join(_IN_BATCH)}")
     table = Table("policy", "condition", "in band", "collided")
     for path in policies:
         policy, _ = load_policy(path)
         stack = policy.layout.stack
         task = FollowMe(FollowSettings(observation="tracked", owner="any", split="test", stack=stack), EPISODES)
         for name in names:
-            pace, numbers = BY_NAME[name].pace, BY_NAME[name].numbers
+            pace, wind_m_s = BY_NAME[name].pace, BY_NAME[name].wind_m_s
+            numbers = {**BY_NAME[name].numbers, "wind_m_s": _AIR["wind_m_s"] if wind_m_s is None else wind_m_s}
             tracks, _ = first_episodes(
                 policy, task, {**_USUAL, **_AIR, "owner_speed_max": _SPEEDS_M_S[pace], "guard": guard, **numbers}
             )

@@ -92,6 +92,8 @@ def entry_from(record: Mapping[str, Any], name: str, sees: str, made: str) -> En
     """
     if record.get("task") != "follow" or not record.get("has_guard"):
         raise EntryError("flights.json: entries fly `benchmark follow` under the guard")
+    if record.get("guard_settings"):
+        raise EntryError(f"flights.json: entries fly under the guard as it ships, not with {record['guard_settings']}")
     flights = record["flights"]
     missing = [key for key in CONDITIONS if key not in flights]
     if missing:

@@ -9,7 +9,9 @@ from autopilot.mavlink.dialects.ardupilot_aliases import ALIASES, CONSTANTS
 from autopilot.params import parameter_sections, parameter_table
 from common.airframe import load_airframe
 from common.params import Parameter
+from docs.generate.conditions_page import conditions_text
 from docs.generate.foxglove_page import foxglove_text
+from docs.generate.guard_page import guard_text
 from docs.generate.mavlink_page import mavlink_text
 from docs.generate.tasks_page import tasks_text
 from docs.generate.training_page import training_text
@@ -108,6 +110,8 @@ def generated_pages() -> dict[Path, str]:
         REFERENCE / "mavlink.md": mavlink_text(Flight(FlightConfig()).server),
         REFERENCE / "training-config.md": training_text(),
         REFERENCE / "tasks.md": tasks_text(),
+        REFERENCE / "follow-conditions.md": conditions_text(),
+        REFERENCE / "guard-settings.md": guard_text(),
         REFERENCE / "world-file.md": world_text(),
         REFERENCE / "scenario-keys.md": reference_text(),
         REFERENCE / "scenario.schema.json": schema_text(),

@@ -50,10 +50,25 @@ class OnnxNetwork:
         self.shapes: dict[str, list[Any]] = {put.name: put.shape for put in self._session.get_inputs()}
         self._memory = next((name for name in self.shapes if "recurrent" in name or "memor" in name), None)
         self._size = self.shapes[self._memory][-1] if self._memory is not None else 0
-        outputs = [put.name for put in self._session.get_outputs()]
-        self._action = next((n for n in outputs if n.startswith("deterministic_continuous")), outputs[0])
+        outputs: dict[str, list[Any]] = {put.name: put.shape for put in self._session.get_outputs()}
+        self._action = next((n for n in outputs if n.startswith("deterministic_continuous")), next(iter(outputs)))
         self._next = next((name for name in outputs if "recurrent" in name or "memor" in name), None)
+        self.action_shape = outputs[self._action]
         self.reset()
+
+    @property
+    def observed(self) -> dict[str, list[Any]]:
+        """The shapes of the inputs by name, but for the memory's."""
+        return {name: shape for name, shape in self.shapes.items() if name != self._memory}
+
+    def in_words(self) -> str:
+        """What it takes and gives, for a sentence: obs_0 [batch, 165], and gives [batch, 4]."""
+
+        def words(shape: list[Any]) -> str:
+            return f"[{', '.join(str(size) for size in shape)}]"
+
+        taken = ", ".join(f"{name} {words(shape)}" for name, shape in self.observed.items())
+        return f"{taken or 'nothing'}, and gives {words(self.action_shape)}"
 
     def reset(self) -> None:
         """Forgets what came before."""

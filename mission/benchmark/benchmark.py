@@ -7,7 +7,10 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from policies.companion.guard.settings import GuardSettings
 
 TASKS = {
     "follow": ("mission.follow.benchmark.following", "follow-me-tracked"),
@@ -27,8 +30,8 @@ class Benchmark:
     columns: tuple[str, ...]
     load: Callable[[str], Any]
     """The pilot that a name means; raises PilotError."""
-    fly: Callable[[Any, str, int, bool], Any]
-    """One flight by a pilot in a condition, from a seed, with the guard or without: its outcome."""
+    fly: "Callable[[Any, str, int, GuardSettings], Any]"
+    """One flight by a pilot in a condition, from a seed, under a guard: its outcome."""
     row: Callable[[str, Sequence[Any]], tuple[str, ...]]
     """The figures of a condition, as people read them."""
     misses: Callable[[str, Sequence[Any]], list[str]]

@@ -8,6 +8,7 @@ from rich.console import Console
 
 from mission.benchmark.benchmark import FIRST_SEED, TASKS
 from mission.console.command_refusal import learn_extra, refuse
+from mission.console.guard_options import GUARD_SETTING, guard_of
 from mission.console.terminal import loading
 
 
@@ -25,6 +26,7 @@ def benchmark(
     jobs: Annotated[int, typer.Option(min=1, help="Processes at a time.")] = 2,
     seed: Annotated[int, typer.Option(min=1, help="Of the first flight; each next is 2 more.")] = FIRST_SEED,
     guard: Annotated[bool, typer.Option("--guard/--no-guard", help="The guard bounds the policy.")] = True,
+    guard_setting: Annotated[list[str] | None, typer.Option(help=GUARD_SETTING)] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for table.md and flights.json.")] = None,
 ) -> None:
     """Fly a policy through standard and harder conditions, over MAVLink, and show how often it succeeds and hits."""
@@ -34,6 +36,7 @@ def benchmark(
         with loading(Console()):
             from mission.benchmark.benchmark import benchmark_of
             from mission.benchmark.session import BenchmarkOptions, benchmark_session, misses
+            from mission.console.option_checks import UserError
             from policies.companion.pilot import PilotError
 
             names = benchmark_of(task).titles
@@ -41,10 +44,11 @@ def benchmark(
         if unknown:
             refuse(f"--condition {unknown[0]}: there are {', '.join(names)}")
         chosen = policy or TASKS[task][1]
-        options = BenchmarkOptions(task, chosen, tuple(condition or ()), flights, jobs, seed, guard, out)
         try:
+            held = guard_of(guard, guard_setting or ())
+            options = BenchmarkOptions(task, chosen, tuple(condition or ()), flights, jobs, seed, held, out)
             outcomes = benchmark_session(options)
-        except PilotError as error:
+        except (PilotError, UserError) as error:
             refuse(str(error))
         found = misses(task, outcomes)
         for text in found:

@@ -66,7 +66,8 @@ class OnnxGoalPilot:
         ]
         self._vector = next((name for name in vectors if shapes[name][1] % frame_size == 0), "")
         if not self._vector:
-            raise PilotError(f"{path}: takes {shapes}; a pilot of this task takes frames of {frame_size} floats")
+            takes = self._network.in_words()
+            raise PilotError(f"{path}: takes {takes}; a pilot of this task takes frames of {frame_size} floats")
         self.stack = shapes[self._vector][1] // frame_size
 
     def reset(self) -> None:

@@ -101,8 +101,8 @@ def _load(name: str) -> NavigationPilot:
     return goal_pilot(name, NavigationPilot, RAY_STACK)
 
 
-def _flown(pilot: NavigationPilot, condition: str, seed: int, has_guard: bool) -> Crossing:
-    return cross(pilot, CONDITIONS[condition], seed, GuardSettings(is_on=has_guard))
+def _flown(pilot: NavigationPilot, condition: str, seed: int, guard: GuardSettings) -> Crossing:
+    return cross(pilot, CONDITIONS[condition], seed, guard)
 
 
 def _row(name: str, crossings: Sequence[Crossing]) -> tuple[str, ...]:

@@ -105,8 +105,8 @@ def _load(name: str) -> DrivingPilot:
     return goal_pilot(name, DrivingPilot, STACK)
 
 
-def _flown(pilot: DrivingPilot, condition: str, seed: int, has_guard: bool) -> Parking:
-    return parked(pilot, CONDITIONS[condition], seed, GuardSettings(is_on=has_guard))
+def _flown(pilot: DrivingPilot, condition: str, seed: int, guard: GuardSettings) -> Parking:
+    return parked(pilot, CONDITIONS[condition], seed, guard)
 
 
 def _row(name: str, drives: Sequence[Parking]) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ import json
 import multiprocessing
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,8 @@ from rich.table import Table
 
 from common.files import write_whole
 from common.pool_worker import end_with_parent
-from mission.benchmark.benchmark import FIRST_SEED, benchmark_of
+from mission.benchmark.benchmark import FIRST_SEED, Benchmark, benchmark_of
+from policies.companion.guard.settings import GuardSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +29,7 @@ class BenchmarkOptions:
     flights: int  # of each
     jobs: int
     seed: int = FIRST_SEED  # of the first flight; every second from there on
-    has_guard: bool = True
+    guard: GuardSettings = field(default_factory=GuardSettings)
     out: Path | None = None
 
 
@@ -38,7 +39,7 @@ class _Flight:
     policy: str
     condition: str
     seed: int
-    has_guard: bool
+    guard: GuardSettings
 
 
 def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
@@ -53,7 +54,7 @@ def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
     names = options.conditions or tuple(benchmark.titles)
     outcomes: dict[str, list[Any]] = {name: [] for name in names}
     flights = [
-        _Flight(options.task, options.policy, name, options.seed + 2 * k, options.has_guard)
+        _Flight(options.task, options.policy, name, options.seed + 2 * k, options.guard)
         for name in names
         for k in range(options.flights)
     ]
@@ -70,14 +71,17 @@ def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
     rows = [benchmark.row(name, outcomes[name]) for name in names]
     console.print(_shown(benchmark.columns, rows))
     if options.out is not None:
-        _write(options.out, options, markdown(benchmark.columns, rows), outcomes)
+        _write(options.out, options, _page(benchmark, rows, outcomes), outcomes)
         console.print(f"table and flights: {options.out}")
     return outcomes
 
 
 def misses(task: str, outcomes: dict[str, list[Any]]) -> list[str]:
-    """What fell short of the conditions' own bounds, a sentence each."""
-    benchmark = benchmark_of(task)
+    """What fell short of what is wanted, a sentence each."""
+    return _misses(benchmark_of(task), outcomes)
+
+
+def _misses(benchmark: Benchmark, outcomes: dict[str, list[Any]]) -> list[str]:
     return [text for name, flown in outcomes.items() for text in benchmark.misses(name, flown)]
 
 
@@ -89,7 +93,7 @@ def _pilot(task: str, name: str) -> Any:
 def _flown(flight: _Flight) -> Any:
     """In a process of its own."""
     pilot = _pilot(flight.task, flight.policy)
-    return benchmark_of(flight.task).fly(pilot, flight.condition, flight.seed, flight.has_guard)
+    return benchmark_of(flight.task).fly(pilot, flight.condition, flight.seed, flight.guard)
 
 
 def _shown(columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> Table:
@@ -105,10 +109,17 @@ def markdown(columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
     return "\n".join([head, *("| " + " | ".join(cells) + " |" for cells in rows)]) + "\n"
 
 
-def _write(out: Path, options: BenchmarkOptions, table: str, outcomes: dict[str, list[Any]]) -> None:
+def _page(benchmark: Benchmark, rows: Sequence[tuple[str, ...]], outcomes: dict[str, list[Any]]) -> str:
+    """The table, and below it what was missed."""
+    missed = _misses(benchmark, outcomes)
+    below = "".join(f"- {text}\n" for text in missed)
+    return markdown(benchmark.columns, rows) + (f"\nMissed:\n\n{below}" if missed else "")
+
+
+def _write(out: Path, options: BenchmarkOptions, page: str, outcomes: dict[str, list[Any]]) -> None:
     out.mkdir(parents=True, exist_ok=True)
-    write_whole(out / "table.md", table.encode())
+    write_whole(out / "table.md", page.encode())
     flown = {name: [asdict(outcome) for outcome in found] for name, found in outcomes.items()}
-    names = ("task", "policy", "has_guard", "seed")
-    record = {name: getattr(options, name) for name in names} | {"flights": flown}
+    record = {name: getattr(options, name) for name in ("task", "policy", "seed")}
+    record |= {"has_guard": options.guard.is_on, "guard_settings": options.guard.changed, "flights": flown}
     write_whole(out / "flights.json", (json.dumps(record, indent=1) + "\n").encode())

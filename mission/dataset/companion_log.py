@@ -101,13 +101,13 @@ class DecisionRecording:
     def __init__(self, companion: Companion, write_row: Callable[..., None], images: ImageFile | None) -> None:
         companion.skill.keep_records()
         companion.on_decision = self._note
-        self._write_row, self._images = write_row, images
+        self._write_row, self._images, self._stances = write_row, images, companion.skill.stances
 
     def _note(self, decision: Decision) -> None:
         number = -1
         if self._images is not None and decision.image is not None:
             number = self._images.add(decision.image)
-        self._write_row(decision.time_us, *topic_row(decision, number))
+        self._write_row(decision.time_us, *topic_row(decision, number, self._stances))
 
     def close(self) -> None:
         """Completes the images; the log is its owner's."""
@@ -120,7 +120,8 @@ class CompanionLog:
 
     def __init__(self, companion: Companion, folder: Path, pilot: str, tell: Callable[[str], None]) -> None:
         layout = companion.skill.record_layout
-        info: dict[str, Any] = {"sys_name": "honeyguide companion", **topic_info(layout, pilot)}
+        about = topic_info(layout, pilot, companion.skill.stances)
+        info: dict[str, Any] = {"sys_name": "honeyguide companion", **about}
         self._log = UlogWriter(folder / COMPANION_LOG, 0, info, {}, on_trouble=tell)
         topic = self._log.add_topic(TOPIC, topic_fields(layout))
         images = ImageFile(folder / IMAGES_FILE, tell) if companion.skill.camera is not None else None

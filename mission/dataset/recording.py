@@ -18,6 +18,6 @@ def record_flight(flight: FlightBase, companion: Companion, folder: Path, pilot:
         pilot: who decides, for the log.
     """
     layout = companion.skill.record_layout
-    write = flight.recorder.keep_topic(TOPIC, topic_fields(layout), topic_info(layout, pilot))
+    write = flight.recorder.keep_topic(TOPIC, topic_fields(layout), topic_info(layout, pilot, companion.skill.stances))
     images = ImageFile(folder / IMAGES_FILE, flight.troubles.note) if companion.skill.camera is not None else None
     return DecisionRecording(companion, write, images)

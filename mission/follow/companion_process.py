@@ -18,6 +18,7 @@ from autopilot.mavlink.transport.links import LinkError
 from common.clock import Pacer, wall_time_s
 from mission.console.terminal import print_line
 from mission.dataset.companion_log import COMPANION_LOG, CompanionLog
+from mission.follow.guard_report import guard_text
 from policies.companion.companion import MISFIT, Companion
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import CameraUrlError
@@ -41,9 +42,9 @@ class CompanionOptions:
     camera: str
     is_reported: bool
     seconds: float | None
+    guard: GuardSettings
     is_by_sticks: bool = False
     follows: bool = False
-    has_guard: bool = True
     record: Path | None = None
 
 
@@ -60,7 +61,7 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
             options.camera,
             is_ordered_by_goto=options.is_reported,
             follows=options.follows,
-            guard=GuardSettings(is_on=options.has_guard),
+            guard=options.guard,
         )
         if options.is_by_sticks and not skill.drives:
             raise CompanionError(f"--by-sticks: {options.policy} flies, and only what drives is driven by sticks")
@@ -83,7 +84,7 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
         companion.close()
         if recording is not None:
             recording.close()
-    return f"{companion.decision_count} decisions; {latency_text(companion)}"
+    return f"{guard_text(companion)}; {latency_text(companion)}"
 
 
 def _recording(companion: Companion, options: CompanionOptions, console: Console) -> CompanionLog | None:

@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 
 from mission.console.command_refusal import learn_extra, refuse
+from mission.console.guard_options import GUARD_SETTING, guard_of
 from mission.console.name_checks import check_policy
 from mission.console.terminal import loading
 
@@ -49,6 +50,7 @@ def companion(
     guard: Annotated[
         bool, typer.Option("--guard/--no-guard", help="A guard that does not believe the policy bounds it.")
     ] = True,
+    guard_setting: Annotated[list[str] | None, typer.Option(help=GUARD_SETTING)] = None,
     record: Annotated[
         Path | None, typer.Option(help="Keep each decision in this folder, for honeyguide dataset build.")
     ] = None,
@@ -59,12 +61,14 @@ def companion(
         if policy != "scripted":
             check_policy(policy)
         with loading(Console()):
+            from mission.console.option_checks import UserError
             from mission.follow.companion_process import CompanionError, CompanionOptions, run_companion
 
         try:
-            options = CompanionOptions(policy, link, camera, engage, seconds, by_sticks, follow, guard, record)
+            held = guard_of(guard, guard_setting or ())
+            options = CompanionOptions(policy, link, camera, engage, seconds, held, by_sticks, follow, record)
             typer.echo(run_companion(options, Console()))
-        except CompanionError as error:
+        except (CompanionError, UserError) as error:
             refuse(str(error))
 
 

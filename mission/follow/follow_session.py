@@ -25,6 +25,7 @@ from mission.boards.board_options import check_board, commands_of
 from mission.boards.board_runs import run_of
 from mission.boards.board_session import station_links
 from mission.connections import open_foxglove, open_links, open_page
+from mission.console.guard_options import guard_of
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
 from mission.dataset.recording import record_flight
@@ -36,6 +37,7 @@ from mission.flight_settings import OURS, FollowOptions
 from mission.follow.companion_process import latency_text
 from mission.follow.follow_options import follow_config
 from mission.follow.follow_scoring import FollowWatch, Smoothness, taken_over
+from mission.follow.guard_report import guard_figures, guard_text
 from mission.follow.lockstep import flight_with_companion
 from mission.kernel_loading import load_kernels
 from mission.run_folder import OwnFiles, run_folder
@@ -44,7 +46,6 @@ from mission.view.film import write_film
 from mission.view.replay_file import RecordingError, load_recording
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
-from policies.companion.guard.settings import GuardSettings
 from policies.companion.names import FOLLOWER, SCRIPTED
 from policies.companion.pilot import PilotError
 from policies.companion.skills.following import Pilot
@@ -74,6 +75,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     """The flight, with what must be held until its end."""
     console = Console()
     speed = speed_of(options.speed)
+    guard = guard_of(options.has_guard, options.guard_settings)
     pilot, name = chosen_pilot(options)
     config = follow_config(options, has_scanner=isinstance(pilot, NavigationPilot))
     foxglove, links = open_foxglove(options, held), _links(options, config, speed)
@@ -94,7 +96,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
             folder=folder,
             wall_s=wall_time_s,
             make_flight=make_flight,
-            guard=GuardSettings(is_on=options.has_guard),
+            guard=guard,
         )
     if options.is_recorded:
         held.callback(record_flight(flight, companion, folder, options.policy or name).close)
@@ -122,14 +124,19 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     if trouble := flight.end_reason or running.error:
         print_line(console, f"result: {trouble}")
     is_down = not trouble and not flight.is_crashed
-    exit_code = finish(watch, session.files, console, is_down=is_down, is_stopped=is_stopped)
-    if flight.is_crashed:
-        print_line(console, "the vehicle crashed" + (f" ({', '.join(watch.takeovers)})" if watch.takeovers else ""))
-    print_line(console, f"{guard_text(companion)}\n{latency_text(companion)}")
+    exit_code = finish(watch, companion, session.files, console, is_down=is_down, is_stopped=is_stopped)
+    _show_flown(flight, watch, companion, console)
     has_film = options.has_film and filmed(flight, folder, console)
     print_line(console, f"{'logs, scorecard and film' if has_film else 'logs and scorecard'}: {folder}")
     session.close()
     return exit_code
+
+
+def _show_flown(flight: FlightBase, watch: FollowWatch, companion: Companion, console: Console) -> None:
+    """Whether it crashed, what the guard has changed, and how long decisions took."""
+    if flight.is_crashed:
+        print_line(console, "the vehicle crashed" + (f" ({', '.join(watch.takeovers)})" if watch.takeovers else ""))
+    print_line(console, f"{guard_text(companion)}\n{latency_text(companion)}")
 
 
 def _links(options: FollowOptions, config: FlightConfig, speed: float | None) -> list[LinkSource]:
@@ -219,11 +226,20 @@ def score_lines(watch: FollowWatch, companion: Companion) -> tuple[str, ...]:
     return (state, f"{watch.judged_s:.0f} s flown by the policy: {figures}")
 
 
-def finish(watch: FollowWatch, files: OwnFiles, console: Console, *, is_down: bool, is_stopped: bool) -> int:
+def finish(
+    watch: FollowWatch,
+    companion: Companion,
+    files: OwnFiles,
+    console: Console,
+    *,
+    is_down: bool,
+    is_stopped: bool,
+) -> int:
     """Writes and shows the scorecard of what the policy flew, if anything was; returns the exit code.
 
     Args:
         watch: which judged it.
+        companion: whose guard is judged, too.
         files: of the run.
         console: where it is shown.
         is_down: it landed in the end, in one piece.
@@ -241,7 +257,7 @@ def finish(watch: FollowWatch, files: OwnFiles, console: Console, *, is_down: bo
         return 0 if is_excused and not files.missing else 1
     card, smoothness = scorecard([track]), watch.smoothness()
     with files.writing("summary.json") as path:
-        summary = summary_of(card) | asdict(smoothness)
+        summary = summary_of(card) | asdict(smoothness) | guard_figures(companion)
         write_whole(path, (json.dumps(summary, indent=2) + "\n").encode())
     console.print(_table(card, smoothness))
     is_good = track.is_whole and card.collision.value == 0.0 and (is_down or is_excused)
@@ -253,15 +269,6 @@ def summary_of(card: Scorecard) -> dict[str, float | None]:
     names = [name for name in Scorecard.__dataclass_fields__ if name not in ("episodes", "minutes")]
     figures = {name: getattr(card, name).value for name in names}
     return {name: value if isfinite(value) else None for name, value in figures.items()} | {"minutes": card.minutes}
-
-
-def guard_text(companion: Companion) -> str:
-    """What a guard has changed of the decisions, most frequent first."""
-    interventions = companion.skill.interventions
-    if interventions is None:
-        return "no guard"
-    reasons = ", ".join(f"{count} {reason}" for reason, count in interventions.most_common())
-    return f"decisions that the guard changed: {reasons or 'none'}; of {companion.decision_count}"
 
 
 def _table(card: Scorecard, smoothness: Smoothness) -> Table:

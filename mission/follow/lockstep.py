@@ -12,6 +12,7 @@ from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory
 from mission.flight import Flight, FlightConfig
 from mission.flight_base import FlightBase
 from mission.follow.follow_scoring import FollowWatch
+from mission.follow.late_link import LateLink
 from mission.script import set_out
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
@@ -61,7 +62,9 @@ def flight_with_companion(
         skill = Navigating(pilot, camera=camera, guard=guard)
     else:
         skill = Following(camera, pilot, guard or GuardSettings())
-    companion = Companion(companion_end, skill, is_reported=is_reported, wall_s=wall_s)
+    lag_s = config.owner.numbers.get("setpoint_lag_s", 0.0) if config.owner is not None else 0.0
+    link = LateLink(companion_end, lag_s, lambda: flight.time_us) if lag_s > 0.0 else companion_end
+    companion = Companion(link, skill, is_reported=is_reported, wall_s=wall_s)
     flight.computers.append(companion)
     return flight, companion
 

@@ -18,6 +18,7 @@ from common.airframe import load_airframe
 from common.files import write_whole
 from mission.client import Running
 from mission.connections import open_foxglove, open_links, open_page
+from mission.console.guard_options import guard_of
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
 from mission.dataset.recording import record_flight
@@ -27,6 +28,7 @@ from mission.flight_config import FlightConfig
 from mission.flight_options import flight_config
 from mission.flight_session import FlightSession
 from mission.flight_settings import ParkOptions
+from mission.follow.guard_report import guard_figures, guard_text
 from mission.follow.lockstep import flight_with_driver
 from mission.kernel_loading import PARKING, load_kernels
 from mission.park.parking import Arrival, drive, get_ready
@@ -36,7 +38,6 @@ from mission.simulator.flight_rig import flight_world
 from mission.view.pose_goals import Pose, PoseGoals
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
-from policies.companion.guard.settings import GuardSettings
 from policies.companion.pilot import PilotError
 from policies.companion.skills.driving import Driving
 from policies.companion.vector_pilot import DrivingPilot
@@ -75,6 +76,7 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
     console = Console()
     speed = speed_of(options.speed)
     config = park_config(options)
+    guard = guard_of(options.has_guard, options.guard_settings)
     pilot = _pilot(options.policy)
     with busy(console, "loading kernels") as say:
         has_camera = options.has_view or options.has_mcap or options.has_foxglove
@@ -87,7 +89,6 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
         raise UserError(str(error)) from error
     page = open_page(options.view_port) if options.has_view else None
     folder = held.enter_context(run_folder(options.run_folder))
-    guard = GuardSettings(is_on=options.has_guard)
     flight, companion = flight_with_driver(config, pilot, links=links, folder=folder, guard=guard)
     if options.is_recorded:
         record_flight(flight, companion, folder, options.policy)
@@ -111,7 +112,8 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
     session.fly(_end(options, running), running)
     running.cancel()
     if spot is not None:
-        _report(spot, arrivals, running, session, console)
+        _report(spot, arrivals, running, companion, session, console)
+    print_line(console, guard_text(companion))
     print_line(console, f"logs: {folder}")
     session.close()
     is_good = spot is None or (bool(arrivals) and arrivals[0].is_there)
@@ -129,14 +131,22 @@ def _end(options: ParkOptions, running: Running) -> Callable[[FlightBase], bool]
     return is_over
 
 
-def _report(spot: Spot, arrivals: list[Arrival], running: Running, session: FlightSession, console: Console) -> None:
+def _report(
+    spot: Spot,
+    arrivals: list[Arrival],
+    running: Running,
+    companion: Companion,
+    session: FlightSession,
+    console: Console,
+) -> None:
     """Shows and writes how it ended."""
     if not arrivals:
         print_line(console, f"result: {running.error}")
         return
     console.print(_table(spot, arrivals[0]))
     with session.files.writing("summary.json") as path:
-        write_whole(path, (json.dumps({"spot": spot.number} | asdict(arrivals[0]), indent=2) + "\n").encode())
+        summary = {"spot": spot.number} | asdict(arrivals[0]) | guard_figures(companion)
+        write_whole(path, (json.dumps(summary, indent=2) + "\n").encode())
 
 
 def chosen_spot(spots: list[Spot], options: ParkOptions) -> Spot | None:

@@ -103,8 +103,24 @@ class Policy(Part):
     name: str
     """One that ships, a file or a run's folder; `scripted` follows by rules."""
     has_guard: bool = True
+    """A guard that does not believe it bounds it."""
+    guard: dict[str, Finite] = Field(default_factory=dict)
+    """Settings of the guard by their names, as [its settings](guard-settings.md) list them: `{owner_m: 1.5}`."""
     scan_lag_s: float = Field(default=0.0, ge=0.0, le=1.0)
     """Of the scans that policies of Navigate see by."""
+
+    @model_validator(mode="after")
+    def _has_such_a_guard(self) -> Self:
+        if self.guard:
+            from policies.companion.guard.settings import GuardSettingError, guard_settings  # takes Warp
+
+            if not self.has_guard:
+                raise KeyRefusal(("guard",), "it has none: has_guard is false")
+            try:
+                guard_settings(self.guard)
+            except GuardSettingError as error:
+                raise KeyRefusal(("guard", error.name), error.wrong) from error
+        return self
 
 
 class Start(Part):

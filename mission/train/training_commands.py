@@ -1,4 +1,4 @@
-"""The commands that train and judge policies: `honeyguide train`, `eval` and `export`.
+"""The commands that train and judge policies: `honeyguide train`, `eval`, `export` and `card`.
 
 `train` has every flag of ML-Agents' `mlagents-learn`; those that make no sense without Unity are accepted and say so.
 """
@@ -150,4 +150,18 @@ def export(
         try:
             export_network(policy, output, Console())
         except USER_ERRORS as error:
+            refuse(str(error))
+
+
+def card(policy: Annotated[str, _POLICY]) -> None:
+    """Show where a policy comes from: task, code, teacher, datasets, and how good it was found to be."""
+    with learn_extra():
+        check_policy(policy)
+        with loading(Console()):
+            from mission.train.policy_card import show_card
+            from policies.learn.export.policy_path import CheckpointError
+
+        try:
+            show_card(policy, Console())
+        except CheckpointError as error:
             refuse(str(error))

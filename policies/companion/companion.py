@@ -166,6 +166,8 @@ class Companion:
             wanted=skill.wanted if is_flying else flown,
             flown=flown,
             own=own,
+            stance=skill.stance if is_flying else "",
+            reasons=tuple(skill.interventions.latest) if is_flying and skill.interventions is not None else (),
             goal=skill.recorded_goal(own),
             image=skill.recorded_image(),
         )

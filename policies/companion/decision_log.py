@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.attitude import Vector, rotated, yaw_of
+from policies.companion.guard.interventions import REASONS
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.vehicle_link import Own
 from policies.tasks.layout import Layout
 
 TOPIC = "policy_decision"
-LAYOUT_KEY, PILOT_KEY = "decision_layout", "decision_pilot"  # of the log's information
+LAYOUT_KEY, PILOT_KEY, GUARD_KEY = "decision_layout", "decision_pilot", "decision_guard"  # of the log's information
 _TEXT_MAX = 60_000  # [byte] of one piece of information
 NO_GOAL: Vector = (nan, nan, nan)
 
@@ -37,6 +38,8 @@ class Decision:
     action: Floats  # in [-1, 1], (actions,); NaN: none
     wanted: Velocity  # what the action asks for
     flown: Velocity  # what was sent, as a guard let it; of who else flies: how the vehicle moves
+    stance: str  # of the guard; "": none has looked
+    reasons: tuple[str, ...]  # why the guard has changed it
     own: Own
     goal: Vector  # [m] north, east, and down or the heading [rad]; NaN: none
     image: NDArray[np.uint8] | None  # that was looked at, (height, width, channels)
@@ -68,11 +71,13 @@ def topic_fields(layout: Layout) -> dict[str, str]:
         "yaw": "float",
         "i_image": "int32_t",  # -1: none was kept
         **dict.fromkeys(("is_flying", "is_first"), "bool"),
+        "guard_stance": "uint8_t",  # its place in the information's list, from 1; 0: no guard has looked
+        "guard_reasons": "uint16_t",  # a bit for each that the information lists
     }
 
 
-def topic_row(decision: Decision, i_image: int) -> tuple[Any, ...]:
-    """A decision as a row of the topic."""
+def topic_row(decision: Decision, i_image: int, stances: Sequence[str]) -> tuple[Any, ...]:
+    """A decision as a row of the topic, given the stances of its guard."""
     own = decision.own
     return (
         max(decision.boot_us, 0),
@@ -89,13 +94,16 @@ def topic_row(decision: Decision, i_image: int) -> tuple[Any, ...]:
         i_image,
         decision.is_flying,
         decision.is_first,
+        stances.index(decision.stance) + 1 if decision.stance else 0,
+        sum(1 << place for place, reason in enumerate(REASONS) if reason in decision.reasons),
     )
 
 
-def topic_info(layout: Layout, pilot: str) -> Mapping[str, Sequence[str]]:
+def topic_info(layout: Layout, pilot: str, stances: Sequence[str]) -> Mapping[str, Sequence[str]]:
     """What the topic is read with; texts by key."""
     text = json.dumps(layout.record())
     return {
         LAYOUT_KEY: [text[at : at + _TEXT_MAX] for at in range(0, len(text), _TEXT_MAX)],
         PILOT_KEY: [pilot],
+        GUARD_KEY: [json.dumps({"stances": stances, "reasons": REASONS})],
     }

@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import torch
 
 from common.clock import wall_time_s
+from common.intervals import wilson_interval
 from policies.learn import checkpoint
 from policies.learn.best_policy import BestPolicy
 from policies.learn.build_learner import build_learner, remarks
@@ -25,6 +26,7 @@ from policies.learn.evaluate import Evaluation
 from policies.learn.export.onnx_export import ParityError, export_policy
 from policies.learn.export.policy_file import CHECKPOINT, POLICY, PolicyCard, policy_record, save_policy
 from policies.learn.export.policy_path import CheckpointError
+from policies.learn.export.provenance import code_record, data_records, teacher_record
 from policies.learn.networks.policy import Policy
 from policies.learn.processes import check_processes, together
 from policies.learn.success_target import SuccessTarget
@@ -151,6 +153,7 @@ class Training:
         self._events_position: dict[str, Any] | None = None
         self._saved: list[dict[str, Any]] = []
         self._parents: list[dict[str, Any]] = []
+        self._teacher, self._data = teacher_record(self.behavior), data_records(self.behavior)
         fraction = self.behavior.success_target
         self._target = SuccessTarget(fraction, self.task_name, self.task_settings) if fraction is not None else None
         self._judged: Evaluation | None = None
@@ -293,13 +296,28 @@ class Training:
         if progress.mean_reward is not None:
             figures["training_reward"] = progress.mean_reward
         if progress.success_rate is not None:
-            figures["training_success_rate"] = progress.success_rate
+            count = progress.scores.episode_count
+            low, high = wilson_interval(progress.scores.count(Outcome.SUCCESS), count)
+            figures |= {"training_success_rate": progress.success_rate, "training_episodes": count}
+            figures |= {"training_success_low": low, "training_success_high": high}
         if self._judged is not None:
             low, high = self._judged.interval
             figures |= {"success_rate": self._judged.success_rate, "success_low": low, "success_high": high}
+            figures["episodes"] = self._judged.episodes
         settings = self.task_settings.model_dump()
         params = {name: asdict(sampler) for name, sampler in self.curriculum.final_params().items()}
-        return PolicyCard(self.task_name, settings, self.seed, self.learner.steps, figures, params, self._parents)
+        return PolicyCard(
+            self.task_name,
+            settings,
+            self.seed,
+            self.learner.steps,
+            figures,
+            params,
+            self._parents,
+            code_record(),
+            self._teacher,
+            self._data,
+        )
 
     def _progress(self) -> Progress:
         now_s = wall_time_s()

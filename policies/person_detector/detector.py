@@ -21,6 +21,7 @@ from policies.tasks.follow_me.observe import HFOV_DEG, LENS_FRD, camera_mount, d
 CELLS = 16  # of the map, in rows and columns
 STRIDE = 4  # pixels of a cell
 RANGE_M = (0.4, 16.0)  # that it tells apart
+SURE = 0.7  # probability from which its word counts, in flight and where it is judged
 _NO_RETURN = 255.0
 _APART = 2  # cells between two people
 _AGREES = (-0.9, 0.45)  # by how much depth may differ from the range by colours, in logarithms

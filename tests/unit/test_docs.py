@@ -122,6 +122,16 @@ def test_readme_can_be_read_at_once():
     assert len(PAGES["README.md"].read_text(encoding="utf-8").split()) < 900
 
 
+def test_readme_says_how_fast_training_is_beside_stable_baselines3_as_it_was_measured():
+    values = {row["name"]: row["value"] for row in json.loads(RESULTS.read_text())}
+    ours = [value for name, value in values.items() if name.endswith("settings, ours over Stable-Baselines3")]
+    alone = [value for name, value in values.items() if name.endswith("torch alone over the loop")]
+    assert (len(ours), len(alone)) == (2, 2)
+    text = " ".join(PAGES["README.md"].read_text(encoding="utf-8").split())
+    assert f"{min(ours):.1f} to {max(ours):.0f} times as fast as Stable-Baselines3's and not 3 times" in text
+    assert f"since {100 * min(alone):.0f} to {100 * max(alone):.0f} % of its time" in text
+
+
 def test_benchmarks_are_those_that_were_measured():
     page, rows = PAGES["docs/reference/benchmarks.md"].read_text(encoding="utf-8"), json.loads(RESULTS.read_text())
     assert with_figures(page, rows) == page, "python -m bench.figures"

@@ -51,14 +51,19 @@ class Outcome:
     trouble: str  # why the companion gave up
 
 
-def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, seconds: float = SECONDS) -> Outcome:
-    """One flight; one that never began to follow did not follow at all."""
-    pilot.reset()
+def flight_of(condition: Condition, seed: int) -> FlightConfig:
+    """What a flight in a condition is made from: how many trees, and how much wind if it is not said, by the seed."""
     k = seed // 2
     world = FOLLOW_WORLD.model_copy(update={"trees_per_ha": TREES_PER_HA[k % 3], "seed": seed})
     owner = OwnerConfig(pace=condition.pace, numbers=dict(condition.numbers))
-    config = FlightConfig(owner=owner, world=world, seed=seed, wind_m_s=WINDS_M_S[k % 5])
-    flight, companion = flight_with_companion(config, pilot, guard=guard)
+    wind_m_s = WINDS_M_S[k % 5] if condition.wind_m_s is None else condition.wind_m_s
+    return FlightConfig(owner=owner, world=world, seed=seed, wind_m_s=wind_m_s, airframe=condition.airframe)
+
+
+def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, seconds: float = SECONDS) -> Outcome:
+    """One flight; one that never began to follow did not follow at all."""
+    pilot.reset()
+    flight, companion = flight_with_companion(flight_of(condition, seed), pilot, guard=guard)
     is_hidden: list[bool] = []
     has_touched = False
 

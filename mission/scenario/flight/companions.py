@@ -10,7 +10,7 @@ from mission.flight_config import FlightConfig
 from mission.follow.lockstep import flight_with_companion, flight_with_driver, flight_with_navigator
 from mission.scenario.scenario import Policy
 from policies.companion.companion import Companion
-from policies.companion.guard.settings import GuardSettings
+from policies.companion.guard.settings import GuardSettings, guard_settings
 from policies.companion.names import SCRIPTED
 from policies.companion.pilot import PilotError
 from policies.companion.skills.load_skill import load_follower
@@ -40,7 +40,7 @@ def flight_with_policy(
     Raises:
         UserError: no such policy, or none for this scenario.
     """
-    guard = GuardSettings(is_on=policy.has_guard)
+    guard = guard_settings(policy.guard) if policy.has_guard else GuardSettings(is_on=False)
     try:
         if config.owner is not None:
             return flight_with_companion(config, load_follower(policy.name), links=links, folder=folder, guard=guard)

@@ -5,7 +5,6 @@ flown or driven, the stance, and what was done how often. Graded: slower, stop; 
 own map of the last scans and asks no policy.
 """
 
-from collections import Counter
 from enum import Enum
 from math import isfinite, radians, sin
 
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from common.attitude import rotated, yaw_of
 from common.range_sectors import RangeLayout
+from policies.companion.guard.interventions import HEIGHT, NEAR_SOMETHING, TOO_FAST, Interventions
 from policies.companion.guard.limits import (
     braking_speed,
     faded,
@@ -66,8 +66,7 @@ class GoalGuard:
         self._rollouts = Rollouts(self.settings)
         self._drives = drives
         self.stance = GoalStance.FREE
-        self.interventions: Counter[str] = Counter()
-        """How many decisions were changed, by the reason."""
+        self.interventions = Interventions()
         self._forget()
 
     def _forget(self) -> None:
@@ -115,6 +114,7 @@ class GoalGuard:
 
     def filtered(self, wanted: Velocity, own: Own) -> Velocity:
         """What is flown of a velocity and a yaw rate that a policy asks for."""
+        self.interventions.decide()
         age_s = max(own.boot_us - self.taken_us, 0) * 1e-6
         dark_s = max(own.boot_us - self._lit_us, 0) * 1e-6
         scale, most = self._trust(age_s, dark_s)
@@ -122,7 +122,7 @@ class GoalGuard:
         level = np.array(velocity[:2])
         kept = scale * level
         kept *= min(1.0, min(most, self.settings.speed_max) / max(float(np.hypot(*kept)), 1e-6))
-        self._count(self.stance.value if self.stance is not GoalStance.FREE else "too fast", level, kept)
+        self._count(TOO_FAST if self.stance is GoalStance.FREE else self.stance.value, level, kept)
         return self._bounded(kept, scale * velocity[2], yaw_rate, own, age_s)
 
     def begin(self, own: Own) -> None:
@@ -134,7 +134,7 @@ class GoalGuard:
         """The nearest velocity that can be flown and stopped in what is clear, between the ground and the crowns."""
         kept = self._rollouts.clear_velocity(level, self._flown, own, self._map)
         self._flown = kept
-        self._count("near something", level, kept)
+        self._count(NEAR_SOMETHING, level, kept)
         if not self._drives:
             down = self._within_heights(down, own)
         return (float(kept[0]), float(kept[1]), float(down)), yaw_rate
@@ -160,12 +160,12 @@ class GoalGuard:
         if not is_low:  # from the ground it goes up, whatever is above
             kept = max(kept, -stopping_speed(self._ceiling_m - s.crown_m, s.reaction_s, 1.0))
         if abs(kept - down) > _COUNTED_M_S:
-            self.interventions["height"] += 1
+            self.interventions.note(HEIGHT)
         return kept
 
     def _count(self, why: str, wanted: Floats, kept: Floats) -> None:
         if float(np.hypot(*(wanted - kept))) > _COUNTED_M_S:
-            self.interventions[why] += 1
+            self.interventions.note(why)
 
 
 class NoseGuard(GoalGuard):
@@ -216,7 +216,7 @@ class NoseGuard(GoalGuard):
         delay_s = age_s + s.reaction_s + s.goal_period_s  # from the scan to the motion that follows, at the latest
         own_speed = np.copysign(1.0, speed) * float(np.dot(nose, own.vel_ned))
         scale = min(1.0, braking_speed(way_m, own_speed, delay_s, s.brake) / abs(speed))
-        self._count("near something", level, scale * level)
+        self._count(NEAR_SOMETHING, level, scale * level)
         return (scale * speed, 0.0, 0.0), scale * yaw_rate  # along the same arc
 
     def _round(self, own: Own) -> Floats:

@@ -5,14 +5,21 @@ Out: the velocity that is flown, the stance, and what was done how often. Graded
 end.
 """
 
-from collections import Counter
 from enum import Enum
-from math import atan2, inf, isfinite
+from math import atan2, inf, isfinite, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from common.attitude import wrapped, yaw_of
+from policies.companion.guard.interventions import (
+    NEAR_SOMEBODY,
+    NEAR_SOMETHING,
+    NO_DEPTH,
+    OVER_OWNER,
+    OVER_SOMEBODY,
+    Interventions,
+)
 from policies.companion.guard.limits import CLIMB_M_S, faded, stopping_speed, within_heights
 from policies.companion.guard.people import PeopleRule, Somebody
 from policies.companion.guard.rollouts import Rollouts
@@ -27,6 +34,8 @@ _YAW_MAX = 1.5  # [rad/s]
 _SEARCH_PERIOD_S = 24.0  # of a search towards the phone: at first it looks there,
 _SEARCH_FACES_S = 4.0  # then there from other sides, since trees may hide who is there,
 _SEARCH_ROUNDS_S = 13.0  # and then round itself
+_AHEAD_S = 13.0  # without a phone it first looks where they went,
+_SWING_RAD, _SWING_S = 0.7, 6.5  # and to both sides of it: twice
 _THERE_M = 2.0  # so near the stand-off it looks round
 _RISEN_US = 2_000_000  # for so long it stays over the owner
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
@@ -55,8 +64,7 @@ class Guard:
         self.senses = senses
         self._people, self._rollouts = PeopleRule(settings), Rollouts(settings)
         self.stance = Stance.FREE
-        self.interventions: Counter[str] = Counter()
-        """How many decisions were changed, by the reason."""
+        self.interventions = Interventions()
         self._begun_us = 0  # when the policy took over, on the vehicle's clock
         self._flown = np.zeros(2)  # what was let be flown last
         self._is_too_near = False
@@ -81,6 +89,7 @@ class Guard:
 
     def filtered(self, wanted: Velocity, own: Own) -> Velocity:
         """What is flown of a velocity in ned and a yaw rate that a policy asks for."""
+        self.interventions.decide()
         s, (velocity, yaw_rate) = self.settings, wanted
         age_s = max(own.boot_us - self.senses.image_us, 0) * 1e-6
         silence_s = self.senses.silence_s(own)
@@ -89,12 +98,12 @@ class Guard:
         down = velocity[2]
         if self.stance in (Stance.SEARCH, Stance.STOP):
             level, down, yaw_rate = self._searched(own, self.stance is Stance.SEARCH)
-            self.interventions[self.stance.value] += 1
+            self.interventions.note(self.stance.value)
         elif self.stance is not Stance.FREE:
             scale = faded(silence_s, s.slow_s, s.stop_s) * faded(age_s, s.image_slow_s, s.image_stop_s)
             level, down = scale * level, scale * down
             yaw_rate = self._facing_owner(own, yaw_rate)
-            self.interventions[self.stance.value] += 1
+            self.interventions.note(self.stance.value)
         level, people = self._past_people(level, own)
         level = self._flown = self._past_solids(level, own, people)
         down = self._within_heights(down, own)
@@ -117,7 +126,7 @@ class Guard:
         return self.senses.is_heard and self.senses.has_met_others
 
     def _searched(self, own: Own, is_searching: bool) -> tuple[Floats, float, float]:
-        """Up, out of people's way; towards the phone, no nearer than a stand-off, and round it; without one it turns.
+        """Up, out of people's way; towards the phone, no nearer than a stand-off, and round it; without one it looks.
 
         With one it turns on the spot too now and then: the phone may be wrong.
         """
@@ -144,9 +153,16 @@ class Guard:
             if phase_s < _SEARCH_ROUNDS_S:
                 return level + s.search_round_speed * np.array([-way[1], way[0]]) / far_m, down, yaw_rate
             return level, down, s.search_yaw_rate
-        if is_searching:
+        lost_s = self.senses.silence_s(own) - s.search_s
+        if lost_s > _AHEAD_S or not self.senses.seen.sights:
             return np.zeros(2), down, s.search_yaw_rate
-        return np.zeros(2), down, self._facing(self.senses.bearing_rad, own)
+        swing_rad = _SWING_RAD * sin(2.0 * pi * max(lost_s, 0.0) / _SWING_S)
+        return np.zeros(2), down, self._facing(self._last_bearing(own) + swing_rad, own)
+
+    def _last_bearing(self, own: Own) -> float:
+        """To where the owner was going when they were seen last [rad], in ned."""
+        way = self.senses.seen.now(own.boot_us)[0][:2] - np.array(own.pos_ned[:2])
+        return atan2(way[1], way[0])
 
     def _facing_owner(self, own: Own, yaw_rate: float) -> float:
         """Towards where sights and phone put an owner who is not seen; a yaw rate if nobody knows."""
@@ -167,7 +183,7 @@ class Guard:
         kept, near = self._people.bound(level, own, everybody, passes_over=self.stance is Stance.SEARCH)
         self._is_too_near = any(person.then_m < self.settings.owner_m for person in near)
         self._sinking_max = min((person.sinking_max for person in near), default=inf)
-        self._count("near somebody", level, kept)
+        self._count(NEAR_SOMEBODY, level, kept)
         return kept, [person for person in near if not person.is_passed_over]
 
     def _past_solids(self, level: Floats, own: Own, people: list[Somebody]) -> Floats:
@@ -175,9 +191,9 @@ class Guard:
         slower = level
         if not around.has_depth:
             slower = level * min(1.0, s.no_depth_speed / max(float(np.hypot(*level)), 1e-6))
-            self._count("no depth", level, slower)
+            self._count(NO_DEPTH, level, slower)
         kept = self._rollouts.clear_velocity(slower, self._flown, own, around, people)
-        self._count("near something", slower, kept)
+        self._count(NEAR_SOMETHING, slower, kept)
         return kept
 
     def _within_heights(self, down: float, own: Own) -> float:
@@ -185,12 +201,12 @@ class Guard:
         if self._is_too_near and not own.range_m > s.height_max_m:
             self._risen_us = own.boot_us
             if self._sinking_max < min(down, 0.0):
-                self.interventions["over the owner"] += 1
+                self.interventions.note(OVER_OWNER)
                 return self._sinking_max
         if own.boot_us - self._risen_us < _RISEN_US:  # they may be right below, where it cannot see them
             down = min(down, 0.0)
         if down - self._sinking_max > _COUNTED_M_S:
-            self.interventions["over somebody near"] += 1
+            self.interventions.note(OVER_SOMEBODY)
         down = min(down, self._sinking_max)
         room_m = self.senses.map.room_up_m(own.pos_ned, own.boot_us) - s.crown_m
         if isfinite(room_m):
@@ -199,4 +215,4 @@ class Guard:
 
     def _count(self, why: str, wanted: Floats, kept: Floats) -> None:
         if float(np.hypot(*(wanted - kept))) > _COUNTED_M_S:
-            self.interventions[why] += 1
+            self.interventions.note(why)

@@ -1,7 +1,14 @@
-"""The numbers of the guard; each can be set. Sources: measured on the x500 in flight, or guesses."""
+"""The numbers of the guard; each can be set. Sources: measured on the x500 in flight, or guesses.
 
-from pydantic import BaseModel, ConfigDict, Field
+In: what a user sets by name, on a command line or in a scenario. Out: all of them, checked.
+"""
 
+from collections.abc import Mapping
+from typing import Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from common.config.refusal import meant_or_known, sentence
 from policies.tasks.follow_me.tracked.keep_off import (
     ESCAPE_CLIMB_M_S,
     OWNER_BRAKE_M_S2,
@@ -11,88 +18,153 @@ from policies.tasks.follow_me.tracked.keep_off import (
     STOP_S,
 )
 
+LONG_S = 3600.0
+IMAGES_S = 2.5  # without images or scans for so long a companion hands back
+SOLID_MAX_M = 0.9  # the map tells no more room than 1 m
+_RISING = (
+    ("slow_s", "stop_s"),
+    ("search_s", "lost_s"),
+    ("image_slow_s", "image_stop_s"),
+    ("height_min_m", "height_max_m"),
+    ("scan_slow_s", "scan_stop_s"),
+    ("dark_slow_s", "dark_stop_s"),
+)
+"""The second of each is above the first."""
+
+
+class GuardSettingError(ValueError):
+    """A setting that is none, or that has a value that it cannot have.
+
+    Args:
+        name: of the setting.
+        wrong: what is wrong, without the name.
+    """
+
+    def __init__(self, name: str, wrong: str) -> None:
+        super().__init__(f"{name}: {wrong}")
+        self.name, self.wrong = name, wrong
+
 
 class GuardSettings(BaseModel):
     """What the guard allows."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
 
     is_on: bool = True
-    slow_s: float = Field(default=SLOW_S, gt=0.0)
+    """Without it what the policy wants is flown."""
+    slow_s: float = Field(default=SLOW_S, gt=0.0, le=LONG_S)
     """Without a sight of the owner for so long it becomes slower ..."""
-    stop_s: float = Field(default=STOP_S, gt=0.0)
+    stop_s: float = Field(default=STOP_S, gt=0.0, le=LONG_S)
     """... until it stands."""
-    search_s: float = Field(default=5.0, gt=0.0)
+    search_s: float = Field(default=5.0, gt=0.0, le=LONG_S)
     """After so long it searches: towards the phone, if that is heard; otherwise it turns round where it is."""
-    search_among_s: float = Field(default=2.5, gt=0.0)
+    search_among_s: float = Field(default=2.5, gt=0.0, le=LONG_S)
     """The same where others were met not long ago and the phone is heard: the owner goes on, behind one of them."""
-    lost_s: float = Field(default=60.0, gt=0.0)
+    lost_s: float = Field(default=60.0, gt=0.0, le=LONG_S)
     """After so long control goes back, in Hold."""
-    search_speed: float = Field(default=4.0, gt=0.0)
+    search_speed: float = Field(default=4.0, gt=0.0, le=20.0)
     """[m/s] towards the phone."""
-    search_stand_off_m: float = Field(default=5.0, gt=0.0)
+    search_stand_off_m: float = Field(default=5.0, gt=0.0, le=20.0)
     """It comes no nearer to where the phone says ..."""
-    search_among_m: float = Field(default=3.0, gt=0.0)
+    search_among_m: float = Field(default=3.0, gt=0.0, le=20.0)
     """... and than this where others were met: from farther away clothes cannot be told apart."""
-    search_round_speed: float = Field(default=1.5, ge=0.0)
+    search_round_speed: float = Field(default=1.5, ge=0.0, le=20.0)
     """[m/s] round it, where nobody is seen there."""
-    search_height_m: float = Field(default=2.6, gt=0.0)
+    search_height_m: float = Field(default=2.6, gt=0.0, le=100.0)
     """Above the ground, where it waits and searches: over people, under crowns ..."""
-    search_among_height_m: float = Field(default=2.9, gt=0.0)
+    search_among_height_m: float = Field(default=2.9, gt=0.0, le=100.0)
     """... and where others were met: so far over their heads that they are no obstacle."""
-    search_yaw_rate: float = Field(default=0.6, gt=0.0)
-    """[rad/s]"""
-    image_slow_s: float = Field(default=0.55, gt=0.0)
+    search_yaw_rate: float = Field(default=0.6, gt=0.0, le=3.0)
+    """[rad/s] on the spot."""
+    image_slow_s: float = Field(default=0.55, gt=0.0, le=IMAGES_S)
     """From this age of the picture on it becomes slower ..."""
-    image_stop_s: float = Field(default=0.8, gt=0.0)
+    image_stop_s: float = Field(default=0.8, gt=0.0, le=IMAGES_S)
     """... until it stands."""
-    owner_m: float = Field(default=OWNER_M, gt=0.0)
+    owner_m: float = Field(default=OWNER_M, gt=0.0, le=20.0)
     """To the middle of the owner: it comes no nearer."""
-    pressed_m: float = Field(default=2.0, gt=0.0)
+    pressed_m: float = Field(default=2.0, gt=0.0, le=20.0)
     """Nearer than this it may go back to where it has not looked; nearer than `owner_m` it climbs too, until above."""
-    escape_climb: float = Field(default=ESCAPE_CLIMB_M_S, ge=0.0)
-    """[m/s]"""
-    owner_brake: float = Field(default=OWNER_BRAKE_M_S2, gt=0.0)
+    escape_climb: float = Field(default=ESCAPE_CLIMB_M_S, ge=0.0, le=20.0)
+    """[m/s] upwards, nearer to somebody than it may be."""
+    owner_brake: float = Field(default=OWNER_BRAKE_M_S2, ge=0.5, le=20.0)
     """[m/s²] with which it is taken to brake before the owner ..."""
-    brake: float = Field(default=4.0, gt=0.0)
+    brake: float = Field(default=4.0, ge=0.5, le=20.0)
     """... and before what does not move."""
-    reaction_s: float = Field(default=REACTION_S, ge=0.0)
+    reaction_s: float = Field(default=REACTION_S, ge=0.0, le=1.0)
     """From a setpoint to the motion, besides the age of the picture; measured."""
-    hears_s: float = Field(default=0.1, ge=0.0)
+    hears_s: float = Field(default=0.1, ge=0.0, le=1.0)
     """The part of that in which nothing is seen of a new velocity; the rest is lag. Before what does not move."""
-    solid_m: float = Field(default=0.7, gt=0.0)
+    solid_m: float = Field(default=0.7, gt=0.0, le=SOLID_MAX_M)
     """From the vehicle's middle to that of a solid cell of the map: it reaches to 0.4 m, half a cell to 0.18 m."""
-    unseen_speed: float = Field(default=0.6, ge=0.0)
+    unseen_speed: float = Field(default=0.6, ge=0.0, le=20.0)
     """[m/s] to where nothing is known."""
-    no_depth_speed: float = Field(default=2.5, ge=0.0)
+    no_depth_speed: float = Field(default=2.5, ge=0.0, le=20.0)
     """[m/s] without depth."""
-    height_min_m: float = Field(default=1.0, ge=0.0)
+    height_min_m: float = Field(default=1.0, ge=0.0, le=100.0)
     """Above the ground: below it climbs."""
-    height_max_m: float = Field(default=3.5, gt=0.0)
+    height_max_m: float = Field(default=3.5, gt=0.0, le=100.0)
     """Above the ground: higher it does not climb; crowns begin soon after."""
-    speed_max: float = Field(default=7.5, gt=0.0)
+    speed_max: float = Field(default=7.5, gt=0.0, le=20.0)
     """[m/s] level, of whoever goes to goals; policies ask for 7."""
-    scan_slow_s: float = Field(default=0.4, gt=0.0)
+    scan_slow_s: float = Field(default=0.4, gt=0.0, le=IMAGES_S)
     """From this age of the ranges on whoever goes to goals becomes slower ..."""
-    scan_stop_s: float = Field(default=0.7, gt=0.0)
+    scan_stop_s: float = Field(default=0.7, gt=0.0, le=IMAGES_S)
     """... until it stands."""
-    dark_slow_s: float = Field(default=0.3, gt=0.0)
+    dark_slow_s: float = Field(default=0.3, gt=0.0, le=60.0)
     """Without any return in the scans for so long it becomes as slow as without depth ..."""
-    dark_stop_s: float = Field(default=2.0, gt=0.0)
+    dark_stop_s: float = Field(default=2.0, gt=0.0, le=60.0)
     """... and after so long it stands, if its beams should see the ground."""
-    crown_m: float = Field(default=0.8, gt=0.0)
+    crown_m: float = Field(default=0.8, gt=0.0, le=100.0)
     """It stays so far below what it has seen overhead."""
-    goal_reaction_s: float = Field(default=0.2, ge=0.0)
+    goal_reaction_s: float = Field(default=0.2, ge=0.0, le=1.0)
     """From a setpoint to the motion of whoever goes to goals, besides the age of the ranges; measured: 0.17 s."""
-    goal_solid_m: float = Field(default=0.5, gt=0.0)
+    goal_solid_m: float = Field(default=0.5, gt=0.0, le=SOLID_MAX_M)
     """As `solid_m`, of whoever goes to goals, between trees that may stand 1.5 m apart."""
-    goal_period_s: float = Field(default=0.1, ge=0.0)
+    goal_period_s: float = Field(default=0.1, ge=0.0, le=1.0)
     """So long what is allowed is driven along the nose, until the next scan."""
-    drive_brake: float = Field(default=2.5, gt=0.0)
+    drive_brake: float = Field(default=2.5, ge=0.5, le=20.0)
     """[m/s²] with which what drives brakes; measured on the rover."""
-    hull_half_length_m: float = Field(default=0.37, gt=0.0)
+    hull_half_length_m: float = Field(default=0.37, gt=0.0, le=5.0)
     """Of what is driven along its nose; those of the rover."""
-    hull_half_width_m: float = Field(default=0.22, gt=0.0)
+    hull_half_width_m: float = Field(default=0.22, gt=0.0, le=5.0)
     """Likewise."""
-    hull_room_m: float = Field(default=0.02, ge=0.0)
+    hull_room_m: float = Field(default=0.02, ge=0.0, le=5.0)
     """It comes no nearer to anything with its hull."""
+
+    @property
+    def changed(self) -> dict[str, float]:
+        """The numbers that are not as they ship."""
+        return self.model_dump(exclude={"is_on"}, exclude_defaults=True)
+
+    @model_validator(mode="after")
+    def _rises(self) -> Self:
+        for low, high in _RISING:
+            less, more = getattr(self, low), getattr(self, high)
+            if less >= more and low in self.model_fields_set:
+                raise GuardSettingError(low, f"must be below {high}, which is {more:g}")
+            if less >= more:
+                raise GuardSettingError(high, f"must be above {low}, which is {less:g}")
+        return self
+
+
+SETTINGS = tuple(name for name in GuardSettings.model_fields if name != "is_on")
+"""Those that are numbers."""
+
+
+def guard_settings(given: Mapping[str, float]) -> GuardSettings:
+    """A guard that is on, with some settings by their names.
+
+    Raises:
+        GuardSettingError: the first that is wrong.
+    """
+    for name in given:
+        if name not in SETTINGS:
+            raise GuardSettingError(name, f"the guard has no such setting; {meant_or_known(name, SETTINGS)}")
+    try:
+        return GuardSettings.model_validate(given)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raised = first.get("ctx", {}).get("error")
+        if isinstance(raised, GuardSettingError):
+            raise raised from error
+        raise GuardSettingError(str(first["loc"][0]), sentence(first, GuardSettings)) from error

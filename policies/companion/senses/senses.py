@@ -7,7 +7,7 @@ where others were met lately only whom phone and looks say.
 """
 
 from dataclasses import replace
-from math import atan2, inf, isfinite
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +24,10 @@ from policies.companion.senses.poses import Pose, PoseHistory
 from policies.companion.senses.seen_owner import PersonNow, SeenOwner, Sight
 from policies.companion.vehicle_link import Own, Owner
 from policies.mono_depth.network import MonoDepth
-from policies.person_detector.detector import Detection, PersonDetector
+from policies.person_detector.detector import SURE, Detection, PersonDetector
 
 Floats = NDArray[np.float64]
 PHONE_OLD_S = 3.0
-_SURE = 0.7  # probability from which the detector's word counts
 _GATE_M = 1.0  # from where the owner is expected by sights; who is farther off is somebody else,
 _GATE_M_S = 2.5  # and wider by so much with each second without a sight,
 _GATE_MAX_M = 8.0
@@ -71,8 +70,6 @@ class Senses:
         self.image_us = 0
         """When the newest image was taken."""
         self.heard_us: int | None = None
-        self.bearing_rad = 0.0
-        """In ned, where the owner was seen last."""
         self._first_us: int | None = None  # when the first image with somebody in it was taken
         self._row: list[Floats] = []  # where who may be the owner was in the last images
         self._others = OtherPeople()
@@ -104,7 +101,7 @@ class Senses:
         found = self._detector.find(pixels, (down[0], down[1]))
         if by_colours is not None:
             found = [replace(detection, has_depth=False) for detection in found]
-        found = [detection for detection in found if detection.probability >= _SURE]
+        found = [detection for detection in found if detection.probability >= SURE]
         seen = self._owner_among(found, pose)
         sighting = None if seen is None else sighting_from(seen.chest_hfrd, pose.pos_ned, pose.q_ned_from_frd)
         self.watch.take(image.time_us, own.boot_us, owner, sighting)
@@ -114,7 +111,6 @@ class Senses:
             self.seen_us = image.time_us
             sight = _sight(seen, pose)
             place = sight.place_ned
-            self.bearing_rad = atan2(place[1] - pose.pos_ned[1], place[0] - pose.pos_ned[0])
             self.seen.see(sight, pose)
         owner_then = self._owner_then(image.time_us, own)
         if by_colours is None:
@@ -237,6 +233,8 @@ class Senses:
         gate_m = min(_GATE_M + _GATE_M_S * silence_s, _GATE_MAX_M)
         if silence_s < _GONE_S:
             return self.seen.now(time_us)[0], gate_m
+        if not self.is_heard and self.seen.sights:  # nobody says where they have gone since: as far as they could
+            return self.seen.now(time_us)[0], _GATE_M + _GATE_M_S * silence_s
         track = self.watch.track
         if self._phone_ned is not None and self.is_heard and self._others.met_us is not None:
             return self._phone_ned, max(gate_m if isfinite(silence_s) else 0.0, _PHONE_GATE_M)

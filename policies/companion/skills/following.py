@@ -4,7 +4,6 @@ A decision ten times a second: on each new image, and where none comes in time o
 then. A guard that does not believe the pilot bounds what it asks for. Where the owner is lost, it does not fly.
 """
 
-from collections import Counter
 from math import isclose
 from typing import Protocol
 
@@ -15,6 +14,7 @@ from common.attitude import Vector
 from common.image_stream import ImageFrame
 from policies.companion.decision_log import NO_GOAL
 from policies.companion.guard.guard import Guard, Stance
+from policies.companion.guard.interventions import BeginningReasons, Interventions
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
 from policies.companion.observation import Observer
@@ -69,6 +69,7 @@ class Following:
     ready, flying, drives = "ready to follow", "following", False
     is_along_nose = False
     action_size = 4
+    stances = tuple(stance.value for stance in Stance)
 
     def __init__(
         self, camera: ImageSource, pilot: Pilot, guard: GuardSettings | None = None, *, hears: bool | None = None
@@ -89,6 +90,7 @@ class Following:
         self._observer = None if is_tracked else Observer(pilot.kind)
         self._vehicle: VehicleLink | None = None
         self._stance = Stance.FREE  # as told
+        self._beginning = BeginningReasons()
         self._is_flying = False
         self._owner = Owner()
         self._image: ImageFrame | None = None  # the newest
@@ -100,8 +102,12 @@ class Following:
         self._is_tracked = False  # the tracker has been told of it
 
     @property
-    def interventions(self) -> Counter[str] | None:
+    def interventions(self) -> Interventions | None:
         return None if self.guard is None else self.guard.interventions
+
+    @property
+    def stance(self) -> str:
+        return "" if self.guard is None else self.guard.stance.value
 
     def attach(self, vehicle: VehicleLink) -> None:
         """Hears nothing that the link does not know of by itself; tells the pilot what the guard does."""
@@ -203,6 +209,9 @@ class Following:
             if self._stance in STANDING and self.guard.stance is Stance.FREE:
                 self._pilot.reset()  # what it remembers is from before
             self._stance = self.guard.stance
+        text = self._beginning.text(self.guard.interventions.latest, own.boot_us)
+        if text and self._vehicle is not None:
+            self._vehicle.say(f"Companion: {text}")
         return allowed
 
     record_layout = RECORD_LAYOUT

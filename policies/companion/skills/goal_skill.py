@@ -5,7 +5,6 @@ guard that does not believe the policy bounds what it asks for; where no scan co
 which is older then.
 """
 
-from collections import Counter
 from dataclasses import replace
 from typing import Protocol
 
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from policies.companion.goals import Goals
 from policies.companion.guard.goal_guard import STANDING, GoalGuard, GoalStance
+from policies.companion.guard.interventions import BeginningReasons, Interventions
 from policies.companion.owner_goal import OwnerGoal
 from policies.companion.ranges import OLD_US, Ranges
 from policies.companion.skills.skill import Floats, Velocity
@@ -49,6 +49,7 @@ class GoalSkill:
     goals: Goals | OwnerGoal  # this and the next two from `attach` on
     ranges: Ranges
     _vehicle: VehicleLink
+    stances = tuple(stance.value for stance in GoalStance)
 
     def __init__(
         self, pilot: VectorPilot, frames: FrameStack, *, is_ordered_by_goto: bool, guard: GoalGuard | None
@@ -61,11 +62,16 @@ class GoalSkill:
         self._decided_us = -DECISION_US
         self.guard = guard
         self._stance = GoalStance.FREE  # as told
+        self._beginning = BeginningReasons()
         self._is_flying = False
 
     @property
-    def interventions(self) -> Counter[str] | None:
+    def interventions(self) -> Interventions | None:
         return None if self.guard is None else self.guard.interventions
+
+    @property
+    def stance(self) -> str:
+        return "" if self.guard is None else self.guard.stance.value
 
     def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
         self.goals.frame(time_us)
@@ -132,7 +138,7 @@ class GoalSkill:
         return action
 
     def _guarded(self, wanted: Velocity, own: Own) -> Velocity:
-        """What the guard lets be flown; its stance is told as it changes."""
+        """What the guard lets be flown; its stance is told as it changes, and its reasons as they begin."""
         self.wanted = wanted
         if self.guard is None:
             return wanted
@@ -143,6 +149,8 @@ class GoalSkill:
             if self._stance in STANDING and stance is GoalStance.FREE:
                 self._forget()  # what it remembers is from before
             self._stance = stance
+        if text := self._beginning.text(self.guard.interventions.latest, own.boot_us):
+            self._vehicle.say(f"Companion: {text}")
         return allowed
 
     def _forget(self) -> None:

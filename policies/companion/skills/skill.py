@@ -4,13 +4,13 @@ The companion itself (companion.py) knows the link, who flies and when setpoints
 task, and who decides.
 """
 
-from collections import Counter
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from common.attitude import Vector
+from policies.companion.guard.interventions import Interventions
 from policies.companion.image_client import ImageSource
 from policies.companion.vehicle_link import Own, VehicleLink
 from policies.tasks.layout import Layout
@@ -30,6 +30,7 @@ class Skill(Protocol):
     action_size: int
     seen: Floats  # the vector that was decided on last
     wanted: Velocity  # what the last action asked for, before a guard
+    stances: tuple[str, ...]  # that its guard may take; a log keeps their places: new ones go to the end
 
     @property
     def camera(self) -> ImageSource | None:
@@ -37,8 +38,13 @@ class Skill(Protocol):
         ...
 
     @property
-    def interventions(self) -> Counter[str] | None:
+    def interventions(self) -> Interventions | None:
         """How many decisions its guard has changed, by the reason; None: it has no guard."""
+        ...
+
+    @property
+    def stance(self) -> str:
+        """Of its guard at the newest decision; "": it has none."""
         ...
 
     def attach(self, vehicle: VehicleLink) -> None:

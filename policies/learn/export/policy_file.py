@@ -32,10 +32,18 @@ class PolicyCard:
     settings: dict[str, Any]  # of the task, all of them
     seed: int
     steps: int
-    figures: dict[str, float] = field(default_factory=dict)  # "success_rate", "training_reward", …
+    figures: dict[str, float] = field(default_factory=dict)
+    """`training_…`: of the last episodes of the training; the others: of episodes that it was judged by. Bounds are of
+    95 %."""
     numbers: dict[str, dict[str, Any]] = field(default_factory=dict)  # of the task, in the last lesson
     parents: list[dict[str, Any]] = field(default_factory=list)
     """The cards of the legs before, the first one first: each began with the networks of the one before."""
+    code: dict[str, str] = field(default_factory=dict)
+    """Version and commit of the code that trained it; empty: of before this was kept, as of the next two."""
+    teacher: dict[str, Any] = field(default_factory=dict)
+    """The policy whose actions it learnt: name, hash and card; empty: it had none."""
+    data: list[dict[str, Any]] = field(default_factory=list)
+    """The datasets that it learnt from: where each lay, what for, and of whom; empty: from none."""
 
     def as_parent(self) -> list[dict[str, Any]]:
         """The parents of who begins with these networks."""

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import torch
+from pyulog import ULog
 from rich.console import Console
 from typer.testing import CliRunner
 
@@ -13,6 +14,9 @@ from mission.dataset.build import BuildOptions, build_dataset
 from mission.dataset.recording import record_flight
 from mission.flight_config import FlightConfig, OwnerConfig
 from mission.follow.lockstep import flight_with_companion, follow_for
+from policies.companion.decision_log import GUARD_KEY, TOPIC
+from policies.companion.guard.interventions import REASONS
+from policies.companion.skills.following import Following
 from policies.companion.skills.load_skill import load_follower
 from policies.datasets.episodes import DatasetError
 from policies.datasets.reader import DatasetReader
@@ -79,6 +83,22 @@ def test_observations_actions_and_images_are_what_the_policy_saw_and_chose(track
     assert is_asked.any()  # where the guard changed nothing
     assert episode.context["wind_m_s"] == 2.0
     assert reader.origin.rewards_by == "truth"
+
+
+def test_the_log_holds_the_stance_of_the_guard_and_what_it_changed_each_decision_for(tracked):
+    folder, _ = tracked
+    log = ULog(str(folder / "flight.ulg"), [TOPIC])
+    words = json.loads("".join(log.msg_info_multiple_dict[GUARD_KEY][0]))
+    assert words == {"stances": list(Following.stances), "reasons": list(REASONS)}
+    columns = log.get_dataset(TOPIC).data
+    is_flying = columns["is_flying"].astype(bool)
+    assert (columns["guard_stance"][is_flying] > 0).all()
+    assert not columns["guard_stance"][~is_flying].any()
+    assert not columns["guard_reasons"][~is_flying].any()
+    changed = np.abs(np.stack([columns[f"wanted[{k}]"] - columns[f"flown[{k}]"] for k in (0, 1)])).max(axis=0) > 0.3
+    is_free = columns["guard_stance"] == 1 + words["stances"].index("following")
+    assert changed[is_free].any()  # it comes upon somebody who stands
+    assert columns["guard_reasons"][changed & is_free].all()
 
 
 def test_the_same_log_gives_the_same_bytes_and_the_estimate_judges_alike(tracked, tmp_path):

@@ -1,7 +1,9 @@
 """Flights of the reproduction: what never comes to follow counts against the policy."""
 
-from bench.follow.flights import fly
-from bench.follow.stages import Cell
+from collections import Counter
+
+from bench.follow.flights import FLIGHTS, fly, seeds_of
+from bench.follow.stages import CELLS, Cell
 from policies.experts.follower import ScriptedFollower
 from policies.tasks.follow_me.scorecard import scorecard
 
@@ -12,6 +14,17 @@ class Misfit(ScriptedFollower):
     """Wants pictures that no camera sends."""
 
     image_shape = (3, 3, 4)
+
+
+def test_no_flight_has_a_seed_of_trainings_or_of_another_flight():
+    seeds = [seed for i in range(len(CELLS)) for seed in seeds_of(i)]
+    assert len(set(seeds)) == len(CELLS) * FLIGHTS
+    assert all(seed % 2 == 1 for seed in seeds)
+
+
+def test_each_wind_blows_as_often_in_every_cell():
+    for i in range(len(CELLS)):
+        assert set(Counter(seed % 5 for seed in seeds_of(i)).values()) == {FLIGHTS // 5}
 
 
 def test_a_flight_is_judged_from_the_companions_first_decision_on():

@@ -21,7 +21,7 @@ from bench.follow.leaderboard_rows import (
 from mission.follow.benchmark.conditions import BY_NAME
 
 
-def record(*in_band, has_guard=True, seeds=SEEDS, conditions=CONDITIONS):
+def record(*in_band, has_guard=True, guard_settings=None, seeds=SEEDS, conditions=CONDITIONS):
     """flights.json of a policy that was so long in the band on each seed."""
     flown = [
         {
@@ -30,7 +30,8 @@ def record(*in_band, has_guard=True, seeds=SEEDS, conditions=CONDITIONS):
         }
         for seed, value in zip(seeds, in_band, strict=True)
     ]  # fmt: skip
-    return {"task": "follow", "policy": "p", "has_guard": has_guard, "flights": dict.fromkeys(conditions, flown)}
+    about = {"task": "follow", "policy": "p", "has_guard": has_guard, "guard_settings": guard_settings or {}}
+    return about | {"flights": dict.fromkeys(conditions, flown)}
 
 
 def entry(name, *in_band):
@@ -66,6 +67,7 @@ def test_two_are_compared_seed_by_seed():
     ("changes", "sentence"),
     [
         ({"has_guard": False}, "under the guard"),
+        ({"guard_settings": {"owner_m": 0.5}}, "under the guard as it ships"),
         ({"seeds": (1, 3, 5, 7)}, "walk: seeds (1, 3, 5, 7), wanted"),
         ({"conditions": CONDITIONS[1:]}, "no flights of walk"),
     ],

@@ -55,6 +55,11 @@ def test_a_port_that_is_taken():
         assert "is in use" in refused("--policy", "scripted", "--link", f"udpin://127.0.0.1:{port}")
 
 
+def test_a_setting_that_the_guard_has_not():
+    sentence = "--guard-setting owner: the guard has no such setting; did you mean owner_m?"
+    assert sentence in refused("--policy", "scripted", "--guard-setting", "owner=2")
+
+
 def test_a_camera_of_another_kind():
     assert "must be tcp://HOST:PORT" in refused("--policy", "scripted", "--camera", "http://127.0.0.1:1")
 

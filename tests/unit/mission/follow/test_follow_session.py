@@ -26,6 +26,10 @@ def test_it_follows_lands_and_writes_scorecard_and_recording(tmp_path):
     assert "scorecard" in result.output
     summary = json.loads((folder / "summary.json").read_text(), parse_constant=pytest.fail)  # no NaN: strict readers
     assert summary["in_band"] is not None
+    guard = summary["guard"]
+    assert guard["decisions"] >= 50
+    assert guard["changed_per_min"].keys() == guard["changed"].keys()
+    assert f"{guard['decisions']} decisions; the guard changed" in result.output
     assert "picture to setpoint" in result.output
     assert "logs and scorecard: " in result.output
     recording = load_recording(folder)
@@ -64,6 +68,7 @@ def test_a_film_shows_every_second_frame(tmp_path):
     [
         (("--owner", "swim"), "--owner swim: must be walk or run"),
         (("--policy", "nobody"), "nobody: no such policy"),
+        (("--guard-setting", "owner_m=-1"), "--guard-setting owner_m: must be above 0, not -1.0"),
         (("--speed", "-1"), "--speed -1: must be a number above 0"),
         (("--airframe", "rover", "--policy", "follow-me"), "follow-me: it was made for another kind of vehicle"),
         (("--airframe", "rover", "--policy", "scripted"), "scripted: it was made for another kind of vehicle"),

@@ -31,7 +31,14 @@ class Judged:
 
     def exit_code(self, folder, *, is_down=True, is_stopped=False):
         console = Console()
-        return finish(self.watch, OwnFiles(folder, console), console, is_down=is_down, is_stopped=is_stopped)
+        return finish(
+            self.watch,
+            self.companion,
+            OwnFiles(folder, console),
+            console,
+            is_down=is_down,
+            is_stopped=is_stopped,
+        )
 
 
 def test_a_person_who_flies_away_and_comes_back_is_not_judged(tmp_path):

@@ -168,6 +168,23 @@ def test_under_the_guard_it_stands_within_five_seconds_of_the_last_sight_and_say
     assert any("searching the owner" in text for text in flight.drone.texts)
 
 
+class FlatOut(ScriptedFollower):
+    """At the owner, as fast as it can."""
+
+    def act(self, vector, image):
+        action = super().act(vector, image)
+        action[:] = 1.0, 0.0, 0.0, 0.0
+        return action
+
+
+def test_the_guard_says_when_it_begins_to_keep_a_policy_off_its_owner():
+    flight, companion = following(pilot=FlatOut())
+    advance(flight, 4.0)
+    assert companion.skill.interventions["near somebody"] > 5
+    texts = [text for text in flight.drone.texts if "guard: near somebody" in text]
+    assert texts == ["Companion: guard: near somebody"]  # once, though it goes on
+
+
 def test_under_the_guard_an_owner_who_is_back_is_followed_again():
     flight, companion = following()
     hide(flight)

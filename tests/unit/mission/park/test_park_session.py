@@ -20,6 +20,7 @@ def test_a_rover_parks_in_a_free_spot_and_says_so(tmp_path):
     assert summary["outcome"] == "there"
     assert summary["distance_m"] < 0.3
     assert summary["turn_deg"] < 10.0
+    assert summary["guard"]["decisions"] > 20
     assert (tmp_path / "run" / "flight.ulg").stat().st_size > 10_000
 
 
@@ -35,6 +36,7 @@ def test_time_that_is_up_before_it_stands_there_is_a_failure(tmp_path):
         (["--spot", "99"], "--spot 99: there are 10; free are 3, 4, 6, 9, 10"),
         (["--spot", "1"], "--spot 1: a car stands there; free are 3, 4, 6, 9, 10"),
         (["--policy", "navigate"], "task is Navigate there and Drive here"),
+        (["--guard-setting", "hull_m=1"], "--guard-setting hull_m: the guard has no such setting"),
         (["--policy", "nobody"], "nobody: no such policy file"),
         (["--airframe", "x500"], "--airframe x500: a drone does not park"),
         (["--idle", "--speed", "max"], "give --seconds to say when it ends"),

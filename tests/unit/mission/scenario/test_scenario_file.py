@@ -99,6 +99,21 @@ def test_python_makes_the_same_scenario(tmp_path):
             "owner: {numbers: {xyz: 3}}\nabout:",
             "1: owner.numbers.xyz: unknown key; there are hill_height_m, trees_per_ha, owner_speed_max,",
         ),
+        (
+            "vehicle:\n",
+            "vehicle:\n  policy:\n    name: scripted\n    guard:\n      owner: 3\n",
+            "6: vehicle.policy.guard.owner: the guard has no such setting; did you mean owner_m?",
+        ),
+        (
+            "vehicle:\n",
+            "vehicle:\n  policy: {name: scripted, guard: {owner_m: -1}}\n",
+            "3: vehicle.policy.guard.owner_m: must be above 0, not -1",
+        ),
+        (
+            "vehicle:\n",
+            "vehicle:\n  policy: {name: scripted, has_guard: false, guard: {owner_m: 2}}\n",
+            "3: vehicle.policy.guard: it has none: has_guard is false",
+        ),
         ("about:", "aboot:", "1: aboot: unknown key; did you mean about?"),
         ("about: Up and down.", "about: [", "not YAML"),
         ("vehicle:\n", "vehicle:\n  plan: a.plan\n", "2: vehicle: plan and script: choose one"),

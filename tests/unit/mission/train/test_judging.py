@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
-from policies.learn.export.policy_file import load_policy
+from mission.train.policy_card import card_rows
+from policies.learn.export.policy_file import PolicyCard, load_policy
+from policies.learn.export.provenance import code_record
 from policies.tasks.catalogue import build_task
 from tests.unit.mission.train.training_run import honeyguide, write_config
 
@@ -15,6 +17,36 @@ def test_policy_is_judged_on_held_out_places(finished):
     assert "success rate" in result.output
     result = honeyguide("eval", finished / "Ball/Ball-2048.pt", "--episodes", "10", "--env-args", "split=train")
     assert "split=train" in result.output
+
+
+def test_a_card_shows_where_a_policy_comes_from(finished):
+    result = honeyguide("card", finished)
+    assert result.exit_code == 0, result.output
+    text = " ".join(result.output.replace("│", " ").split())
+    assert "task RollerBall (preset=as-coded, split=train, stack=0)" in text
+    assert "seed 3 steps 10,240" in text
+    assert f"version {code_record()['version']}, commit {code_record()['commit'][:30]}" in text
+    assert "(95 %: " in text
+    assert "last episodes" in text
+
+
+def test_a_cards_rows_name_teacher_data_and_the_legs_before():
+    parent = {"task": "Hover", "seed": 4, "steps": 500, "code": {"version": "1", "commit": "abc"}}
+    data = {"path": "shown", "use": "gail", "episodes": 3, "pilot": "expert"}
+    teacher = {"policy": "master", "sha256": "0123456789abcdef", "card": parent}
+    figures = {"success_rate": 0.9, "success_low": 0.88, "success_high": 0.92, "episodes": 2000}
+    rows = dict(card_rows(PolicyCard("Hover", {}, 1, 9, figures, {}, [parent], {}, teacher, [data])))
+    assert rows["success, judged"] == "90.00 % (95 %: 88.00 to 92.00) of 2,000 episodes that it did not train on"
+    assert rows["teacher"] == "master: Hover, seed 4, 500 steps, commit abc; 0123456789ab"
+    assert rows["data, gail"] == "shown: episodes 3, pilot expert"
+    assert rows["began with"] == "Hover, seed 4, 500 steps, commit abc"
+    assert rows["code"] == "not known"
+
+
+def test_the_card_of_nobody_is_refused():
+    result = honeyguide("card", "nobody")
+    assert result.exit_code == 2
+    assert "nobody: no such policy file" in result.stderr
 
 
 def test_policy_is_judged_with_the_numbers_it_was_trained_with():

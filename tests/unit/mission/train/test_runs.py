@@ -15,6 +15,7 @@ import torch
 from policies.learn.checkpoint import checkpoints, load
 from policies.learn.config.load import load_config
 from policies.learn.export.policy_file import load_policy
+from policies.learn.export.provenance import code_record
 from tests.small_files import files_of_at_most
 from tests.unit.mission.train.training_run import RUN, honeyguide, in_process, train, write_config
 
@@ -91,7 +92,12 @@ def test_card_says_where_the_policy_comes_from(finished):
     _, card = load_policy(finished / "Ball.pt")
     assert (card.task, card.seed, card.steps) == ("RollerBall", 3, 10_240)
     assert card.settings["split"] == "train"
-    assert 0.0 <= card.figures["training_success_rate"] <= 1.0
+    figures = card.figures
+    low, high = figures["training_success_low"], figures["training_success_high"]
+    assert 0.0 <= low < figures["training_success_rate"] < high <= 1.0
+    assert figures["training_episodes"] > 100
+    assert card.code == code_record()
+    assert (card.teacher, card.data, card.parents) == ({}, [], [])
 
 
 def test_same_seed_trains_the_same_policy(finished):
@@ -260,6 +266,7 @@ def test_training_stops_when_episodes_it_did_not_train_on_succeed():
     assert "success target reached" in result.output
     _, card = load_policy(RUN / "Ball.pt")
     assert card.figures["success_low"] >= 0.1
+    assert card.figures["episodes"] == 2000
     assert card.steps < 300_000
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from common.image_stream import ImageFrame
 from policies.companion.guard.guard import Guard, Stance
-from policies.companion.guard.settings import GuardSettings
+from policies.companion.guard.settings import GuardSettings, guard_settings
 from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import Own, Owner
@@ -48,6 +48,29 @@ def test_it_lets_fly_towards_somebody_far_enough_and_stops_when_they_are_gone(sc
     speeds = flown(guard, own, 6.0)
     assert all(abs(speed) < 1e-6 for speed in speeds[21:])
     assert guard.stance is Stance.SEARCH
+
+
+def test_without_a_phone_a_search_looks_where_the_owner_went_then_all_round(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, sees = scene
+    flown(guard, own, 1.0)
+    sees.is_there = False
+    flown(guard, own, 6.0)
+    turns = []
+    for _ in range(200):
+        flown(guard, own, 0.1)
+        turns.append(guard.filtered(((0.0, 0.0, 0.0), 0.0), own)[1])
+    ahead, later = np.array(turns[:110]), turns[140:]
+    assert ahead.max() > 0.8
+    assert ahead.min() < -0.8
+    assert abs(ahead.mean()) < 0.2
+    assert later == [guard.settings.search_yaw_rate] * len(later)
+
+
+def test_a_larger_distance_to_the_owner_is_kept(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, sees = scene
+    near = flown(guard, own, 1.0)[-1]
+    far = Guard(guard_settings({"owner_m": 2.5}), Senses(detector=sees))  # type: ignore[arg-type]
+    assert flown(far, own, 1.0)[-1] < near - 0.5
 
 
 def test_what_was_seen_before_a_restart_is_not_taken_for_a_sight_of_now(scene: tuple[Guard, Own, Sees]) -> None:

@@ -36,6 +36,16 @@ def test_policy_that_was_saved_acts_the_same(tmp_path, network):
     assert again.layout == policy.layout
 
 
+def test_a_card_of_before_code_teacher_and_data_were_kept_is_read(tmp_path):
+    path = tmp_path / "a.pt"
+    save_policy(path, make_policy(), CARD)
+    content = load(path, "policy")
+    for name in ("numbers", "parents", "code", "teacher", "data"):
+        del content["card"][name]
+    save(path, content, "policy")
+    assert load_policy(path)[1] == CARD
+
+
 def test_policy_file_of_two_layers_of_128_is_small(tmp_path):
     save_policy(tmp_path / "a.pt", make_policy(), CARD)
     assert (tmp_path / "a.pt").stat().st_size < 200_000

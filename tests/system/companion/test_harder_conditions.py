@@ -1,0 +1,37 @@
+"""The policy that ships, under its guard, in conditions that are hard: one flight of each, of half a minute.
+
+What is asked holds for every flight: nobody is touched, and an owner who is not to be seen is waited for.
+"""
+
+import pytest
+
+from mission.follow.benchmark.conditions import BY_NAME
+from mission.follow.benchmark.flights import HOLD_S, Outcome, fly
+from mission.follow.benchmark.pilots import any_pilot
+from policies.companion.guard.settings import GuardSettings
+from policies.companion.names import FOLLOWER
+
+pytestmark = pytest.mark.slow
+
+SEED = 2_000_007  # whoever hides does so after 5.5 s
+SECONDS = 30.0
+
+
+def flown(name: str) -> Outcome:
+    outcome = fly(any_pilot(FOLLOWER), BY_NAME[name], SEED, GuardSettings(), seconds=SECONDS)
+    assert not outcome.is_collided, outcome
+    assert outcome.ended_s == pytest.approx(SECONDS, abs=0.2), outcome
+    return outcome
+
+
+@pytest.mark.parametrize("name", ["late-200", "frozen", "crossed"])
+def test_nobody_is_touched_and_the_owner_is_followed_to_the_end(name: str) -> None:
+    outcome = flown(name)
+    assert outcome.in_band > 0.5, outcome  # it follows at all; how well is the benchmark's question
+
+
+@pytest.mark.parametrize("name", ["gone-8", "gone-8-silent"])
+def test_it_stands_soon_after_the_last_sight_of_an_owner(name: str) -> None:
+    outcome = flown(name)
+    assert outcome.has_stood, f"not {HOLD_S:g} s after it: {outcome}"
+    assert outcome.nearest_hidden_m > 1.0, outcome

@@ -1,0 +1,51 @@
+"""The detector that ships, as it flies, on worlds that no training has: figures of docs/how-to/follow-me.md hold."""
+
+import numpy as np
+import pytest
+
+from common.image_stream import ImageFrame
+from policies.companion.senses.senses import Senses
+from policies.companion.vehicle_link import Own, Owner
+from policies.person_detector.detector import SURE, Detection, PersonDetector
+from policies.person_detector.scenes import scenes
+from policies.person_detector.training import is_sure
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, TILT_DEG
+
+
+@pytest.fixture(scope="module")
+def judged():
+    """Of pictures with somebody, and of pictures of nobody, whether it is sure of somebody."""
+    there, detector = scenes(1024, 11, is_test=True), PersonDetector()
+    return tuple(is_sure(detector, there.images[rows]) for rows in (there.has_person, there.is_empty))
+
+
+def test_it_sees_nobody_in_pictures_of_nobody(judged):
+    _, ghosts = judged
+    assert len(ghosts) > 250
+    assert ghosts.mean() < 0.02  # 0.7 % of 2,000
+
+
+def test_it_sees_who_is_there(judged):
+    seen, _ = judged
+    assert len(seen) > 400
+    assert seen.mean() > 0.88  # 92.2 % of 3,700
+
+
+@pytest.mark.parametrize(("probability", "is_seen"), [(SURE - 0.01, False), (SURE + 0.01, True)])
+def test_in_flight_its_word_counts_from_the_probability_that_it_is_judged_at(probability, is_seen):
+    pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 200, np.uint8)
+    senses, own = Senses(detector=Says(probability)), Own(pos_ned=(0.0, 0.0, -1.6), range_m=1.6)
+    for time_us in range(100_000, 1_100_000, 100_000):
+        own.boot_us = time_us
+        senses.sense(own, Owner(), ImageFrame(time_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M)))
+    assert (senses.silence_s(own) < 1.0) is is_seen
+
+
+class Says:
+    """A detector that finds somebody three metres ahead, with a probability."""
+
+    def __init__(self, probability):
+        self._found = [Detection(probability, (3.0, 0.0, 0.6), (32.0, 32.0))]
+
+    def find(self, *_):
+        return self._found
