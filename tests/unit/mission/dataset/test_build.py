@@ -30,13 +30,13 @@ def refused(*words):
 def logged(path, count=200):
     """A companion's log: decisions of a vehicle that goes north, whose goal is far."""
     path.parent.mkdir(exist_ok=True)
-    log = UlogWriter(path, 0, topic_info(LAYOUT, "somebody"), {})
+    log = UlogWriter(path, 0, topic_info(LAYOUT, "somebody", ()), {})
     topic = log.add_topic(TOPIC, topic_fields(LAYOUT))
     frame, still = np.zeros(LAYOUT.frame_size), [0.0] * 4
     for k in range(count):
         pos_ned, vel_ned, goal = (0.1 * k, 0.0, -2.0), (1.0, 0.0, 0.0), (500.0, 0.0, -2.0)
         motion = (*still, *still, *still, *pos_ned, *vel_ned, *goal)
-        topic.write_row(100_000 * (k + 1), 0, *frame, *motion, 0.0, -1, True, k == 0)
+        topic.write_row(100_000 * (k + 1), 0, *frame, *motion, 0.0, -1, True, k == 0, 0, 0)
     log.close()
     return path
 
