@@ -249,7 +249,7 @@ class Flight(FlightBase):
         self.controller.frame(self.time_us)
         self.drone.frame(self.time_us)
         if self.onboard is not None:
-            self.onboard.frame(self.time_us)
+            self.onboard.frame(self.time_us, self.controller.state.boot_us)
         for computer in self.computers:
             computer.frame(self.time_us)
         self._cameras.frame()

@@ -130,26 +130,15 @@ class Drone(Client):
     # -- actions ----------------------------------------------------------------------------------------------------
 
     async def wait_ready(self, timeout_s: float = 60.0) -> None:
-        """Returns when the vehicle may be armed and knows its home.
-
-        Raises:
-            ScriptTimeout: it may not in time; it says why not.
-        """
+        """Returns when the vehicle may be armed and knows its home; the ScriptTimeout says why it may not."""
         try:
             await self.until(lambda: self.is_ready, timeout_s, "ready to arm")
         except ScriptTimeout as timeout:
-            reasons = await self._reasons_against_arming()
-            raise ScriptTimeout(": ".join([str(timeout), *reasons])) from timeout
-
-    async def _reasons_against_arming(self) -> list[str]:
-        """What it says when it is asked, in one line; nothing if it does not."""
-        heard = len(self.texts)
-        try:
-            await self.command(CMD_RUN_PREARM_CHECKS, name="arming checks")
-        except ScriptError:
-            return []
-        await self.sleep(_SAYS_S)
-        return [", ".join(text.removeprefix("PreArm: ") for text in self.texts[heard:])] if self.texts[heard:] else []
+            heard = len(self.texts)
+            self._end.command(CMD_RUN_PREARM_CHECKS)
+            await self.sleep(_SAYS_S)
+            reasons = ", ".join(text.removeprefix("PreArm: ") for text in self.texts[heard:])
+            raise ScriptTimeout(": ".join(filter(None, (str(timeout), reasons)))) from timeout
 
     async def arm(self, *, force: bool = False) -> None:
         if not self.is_armed and self.px4_mode in ((MAIN_AUTO, AUTO_RTL), (MAIN_AUTO, AUTO_LAND)):

@@ -34,20 +34,20 @@ class LateCamera:
         """Somebody who gets every picture from now on."""
         self.sinks.append(sink)
 
-    def publish(self, frame: ImageFrame) -> None:
-        """Called by the camera; what becomes of a picture goes by its number, the first is 1."""
+    def publish(self, frame: ImageFrame, time_us: int) -> None:
+        """Called by the camera now; what becomes of a picture goes by its number, the first is 1."""
         self._inputs[2] = frame.sequence - 1
         wp.launch(delay_rows, 1, self._inputs)
         delay_s = float(np.asarray(self._delay_s.numpy())[0])
         if delay_s >= 0.0:
-            self._under_way.append((frame.time_us + round(delay_s * 1e6), frame))
+            self._under_way.append((time_us + round(delay_s * 1e6), frame))
 
     def frame(self, time_us: int) -> None:
         """Hands on what has come by now, the newest last; what came after a newer one is left out."""
         come = [frame for due_us, frame in self._under_way if due_us <= time_us]
         if not come:
             return
-        newest = max(come, key=lambda frame: frame.time_us)
-        self._under_way = deque(item for item in self._under_way if item[1].time_us > newest.time_us)
+        newest = max(come, key=lambda frame: frame.sequence)
+        self._under_way = deque(item for item in self._under_way if item[1].sequence > newest.sequence)
         for sink in self.sinks:
             sink(newest)

@@ -56,8 +56,13 @@ class OnboardCamera:
         self._renderer = self._renderer or self._make_renderer()
         self.way.add_sink(sink)
 
-    def frame(self, time_us: int) -> None:
-        """Takes a picture if one is due and somebody gets it, and hands on what has come."""
+    def frame(self, time_us: int, boot_us: int = 0) -> None:
+        """Takes a picture if one is due and somebody gets it, and hands on what has come.
+
+        Args:
+            time_us: of the flight.
+            boot_us: when the vehicle's clock began, which pictures are stamped by.
+        """
         is_due = time_us >= self._due_us
         if is_due:
             self._due_us = max(self._due_us + PERIOD_US, time_us)
@@ -66,7 +71,8 @@ class OnboardCamera:
             return
         if is_due:
             pixels, half_m = self._renderer.take(), float(DEPTH_HALF_M)
-            self.way.publish(ImageFrame(time_us, self._sequence, pixels, HFOV_DEG, TILT_DEG, half_m))
+            image = ImageFrame(time_us - boot_us, self._sequence, pixels, HFOV_DEG, TILT_DEG, half_m)
+            self.way.publish(image, time_us)
         self.way.frame(time_us)
 
 

@@ -96,13 +96,13 @@ def check_purpose(scenario: Scenario) -> None:
     Raises:
         KeyRefusal: nothing is to be flown, and nothing is checked.
     """
-    if not (scenario.checks or scenario.faults or any(_is_told(vehicle) for vehicle in scenario.fleet)):
+    if not (scenario.checks or scenario.faults or any(_has_order(vehicle) for vehicle in scenario.fleet)):
         raise KeyRefusal(
             scenario.fleet_keys[0], "is told nothing and nothing is checked: give it a script, or add checks"
         )
 
 
-def _is_told(vehicle: Vehicle) -> bool:
+def _has_order(vehicle: Vehicle) -> bool:
     return bool(vehicle.script or vehicle.plan or vehicle.python or vehicle.policy)
 
 

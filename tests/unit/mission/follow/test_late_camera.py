@@ -17,7 +17,9 @@ def come(pictures: int = 200, **numbers: float) -> list[tuple[int, int]]:
     for step in range(pictures * IMAGE_US // FRAME_US):
         now_us = step * FRAME_US
         if now_us % IMAGE_US == 0:
-            camera.publish(ImageFrame(now_us, 1 + now_us // IMAGE_US, np.zeros((1, 1, 4), np.uint8), 90.0, 0.0, 4.0))
+            camera.publish(
+                ImageFrame(now_us, 1 + now_us // IMAGE_US, np.zeros((1, 1, 4), np.uint8), 90.0, 0.0, 4.0), now_us
+            )
         camera.frame(now_us)
     return found
 
