@@ -5,11 +5,9 @@ what its replay needs in its log. Ctrl-C, SIGTERM and a closed terminal end it a
 """
 
 import gc
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rich.console import Console
 from rich.live import Live
@@ -17,6 +15,7 @@ from rich.table import Table
 
 from common.files import write_to_nowhere
 from mission.client import Running
+from mission.console.interrupts import signals_interrupt
 from mission.console.progress_line import TABLE_PERIOD_S, Progress
 from mission.console.terminal import LINE_PERIOD_S, print_line
 from mission.flight_base import FlightBase
@@ -153,7 +152,7 @@ def run_shown(
     """
     gc.freeze()  # what is loaded by now stays: to look through it takes 0.2 s, in the middle of a flight
     try:
-        with _signals_interrupt(), Live(console=console, transient=True, auto_refresh=False) as live:
+        with signals_interrupt(), Live(console=console, transient=True, auto_refresh=False) as live:
 
             def on_frame(_: object) -> None:
                 for watch in watchers:
@@ -170,25 +169,3 @@ def run_shown(
         console.print("stopped by the user")
     except SystemExit:  # rich's: who read what is printed has gone, which is as a terminal that was closed
         write_to_nowhere(1)
-
-
-@contextmanager
-def _signals_interrupt() -> Iterator[None]:
-    """Inside, SIGTERM is what Ctrl-C is, and so is SIGHUP: a terminal that was closed takes no more lines."""
-
-    def interrupt(*_: object) -> NoReturn:
-        raise KeyboardInterrupt
-
-    def hang_up(*_: object) -> NoReturn:
-        write_to_nowhere(1, 2)
-        raise KeyboardInterrupt
-
-    before = {
-        number: signal.signal(number, handler)
-        for number, handler in ((signal.SIGTERM, interrupt), (signal.SIGHUP, hang_up))
-    }
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

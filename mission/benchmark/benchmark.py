@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mission.benchmark.kept_flight import KeptFlight
     from policies.companion.guard.settings import GuardSettings
 
 TASKS = {
@@ -30,8 +31,8 @@ class Benchmark:
     columns: tuple[str, ...]
     load: Callable[[str], Any]
     """The pilot that a name means; raises PilotError."""
-    fly: "Callable[[Any, str, int, GuardSettings], Any]"
-    """One flight by a pilot in a condition, from a seed, under a guard: its outcome."""
+    fly: "Callable[[Any, str, int, GuardSettings, KeptFlight], Any]"
+    """One flight by a pilot in a condition, from a seed, under a guard, of which something may stay: its outcome."""
     row: Callable[[str, Sequence[Any]], tuple[str, ...]]
     """The figures of a condition, as people read them."""
     misses: Callable[[str, Sequence[Any]], list[str]]

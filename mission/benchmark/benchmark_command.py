@@ -28,6 +28,9 @@ def benchmark(
     guard: Annotated[bool, typer.Option("--guard/--no-guard", help="The guard bounds the policy.")] = True,
     guard_setting: Annotated[list[str] | None, typer.Option(help=GUARD_SETTING)] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for table.md and flights.json.")] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Folder for each flight's logs and decisions, as dataset build takes them.")
+    ] = None,
 ) -> None:
     """Fly a policy through standard and harder conditions, over MAVLink, and show how often it succeeds and hits."""
     if task not in TASKS:
@@ -46,7 +49,7 @@ def benchmark(
         chosen = policy or TASKS[task][1]
         try:
             held = guard_of(guard, guard_setting or ())
-            options = BenchmarkOptions(task, chosen, tuple(condition or ()), flights, jobs, seed, held, out)
+            options = BenchmarkOptions(task, chosen, tuple(condition or ()), flights, jobs, seed, held, out, record)
             outcomes = benchmark_session(options)
         except (PilotError, UserError) as error:
             refuse(str(error))

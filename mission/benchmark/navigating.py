@@ -14,6 +14,7 @@ from common.intervals import bootstrap, rate
 from mission.benchmark.benchmark import Benchmark
 from mission.benchmark.goal_flights import Crossing, advance, crossed, send_goto
 from mission.benchmark.goal_pilots import goal_pilot
+from mission.benchmark.kept_flight import KeptFlight
 from mission.flight import Flight
 from mission.flight_config import FlightConfig
 from mission.follow.lockstep import flight_with_navigator
@@ -55,7 +56,9 @@ CONDITIONS = {
 }
 
 
-def cross(pilot: NavigationPilot, forest: Forest, seed: int, guard: GuardSettings) -> Crossing:
+def cross(
+    pilot: NavigationPilot, forest: Forest, seed: int, guard: GuardSettings, kept: KeptFlight | None = None
+) -> Crossing:
     """One flight.
 
     Args:
@@ -63,15 +66,18 @@ def cross(pilot: NavigationPilot, forest: Forest, seed: int, guard: GuardSetting
         forest: the condition.
         seed: of all that is drawn; odd.
         guard: who bounds the pilot.
+        kept: what stays of it; None: nothing.
     """
     pilot.reset()
+    kept = kept or KeptFlight()
     rng = np.random.default_rng([seed, 0x4E41])
     wind_m_s, gust_m_s, noise = rng.uniform(0.0, 6.0), rng.uniform(0.0, 3.0), rng.uniform(0.5, 1.5)
     world = FOREST.model_copy(
         update={"seed": seed, "trees_per_ha": forest.trees_per_ha, "hill_height_m": rng.uniform(0.0, 6.0)}
     )
     config = FlightConfig(is_forest=True, world=world, seed=seed, noise=noise, scan_lag_s=forest.lag_s)
-    flight, companion = flight_with_navigator(config, pilot, guard=guard)
+    flight, companion = flight_with_navigator(config, pilot, folder=kept.folder, guard=guard)
+    kept.begin(flight, companion)
     try:
         flight.fly(take_off, seconds=TAKEOFF_S)
         advance(flight, SETTLE_S)
@@ -101,8 +107,8 @@ def _load(name: str) -> NavigationPilot:
     return goal_pilot(name, NavigationPilot, RAY_STACK)
 
 
-def _flown(pilot: NavigationPilot, condition: str, seed: int, guard: GuardSettings) -> Crossing:
-    return cross(pilot, CONDITIONS[condition], seed, guard)
+def _flown(pilot: NavigationPilot, condition: str, seed: int, guard: GuardSettings, kept: KeptFlight) -> Crossing:
+    return cross(pilot, CONDITIONS[condition], seed, guard, kept)
 
 
 def _row(name: str, crossings: Sequence[Crossing]) -> tuple[str, ...]:

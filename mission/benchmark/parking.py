@@ -13,6 +13,7 @@ import numpy as np
 from common.intervals import bootstrap, rate
 from mission.benchmark.benchmark import Benchmark, changed_per_min
 from mission.benchmark.goal_pilots import goal_pilot
+from mission.benchmark.kept_flight import KeptFlight
 from mission.flight_config import FlightConfig
 from mission.follow.lockstep import flight_with_driver
 from mission.park.park_session import REVERSES, pose_in
@@ -61,7 +62,7 @@ class Parking:
     why: str
 
 
-def parked(pilot: DrivingPilot, lot: Lot, seed: int, guard: GuardSettings) -> Parking:
+def parked(pilot: DrivingPilot, lot: Lot, seed: int, guard: GuardSettings, kept: KeptFlight | None = None) -> Parking:
     """One drive.
 
     Args:
@@ -69,15 +70,18 @@ def parked(pilot: DrivingPilot, lot: Lot, seed: int, guard: GuardSettings) -> Pa
         lot: the condition.
         seed: of all that is drawn; odd.
         guard: who bounds the pilot.
+        kept: what stays of it; None: nothing.
     """
     pilot.reset()
+    kept = kept or KeptFlight()
     rng = np.random.default_rng([seed, 0x5041])
     world = CAR_PARK.model_copy(update={"seed": seed, "mover_count": lot.cart_count})
     config = FlightConfig(
         airframe="rover", has_lidar=True, has_base=True, world=world, seed=seed, noise=rng.uniform(0.5, 1.5),
         parameters=REVERSES,
     )  # fmt: skip
-    flight, companion = flight_with_driver(config, pilot, guard=guard)
+    flight, companion = flight_with_driver(config, pilot, folder=kept.folder, guard=guard)
+    kept.begin(flight, companion)
     try:
         ready = flight.fly(get_ready, seconds=READY_S)
         if ready.error is not None:
@@ -105,8 +109,8 @@ def _load(name: str) -> DrivingPilot:
     return goal_pilot(name, DrivingPilot, STACK)
 
 
-def _flown(pilot: DrivingPilot, condition: str, seed: int, guard: GuardSettings) -> Parking:
-    return parked(pilot, CONDITIONS[condition], seed, guard)
+def _flown(pilot: DrivingPilot, condition: str, seed: int, guard: GuardSettings, kept: KeptFlight) -> Parking:
+    return parked(pilot, CONDITIONS[condition], seed, guard, kept)
 
 
 def _row(name: str, drives: Sequence[Parking]) -> tuple[str, ...]:

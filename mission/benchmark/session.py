@@ -16,6 +16,9 @@ from rich.table import Table
 from common.files import write_whole
 from common.pool_worker import end_with_parent
 from mission.benchmark.benchmark import FIRST_SEED, Benchmark, benchmark_of
+from mission.benchmark.kept_flight import KeptFlight
+from mission.console.option_checks import UserError
+from mission.console.terminal import print_line
 from policies.companion.guard.settings import GuardSettings
 
 
@@ -31,6 +34,7 @@ class BenchmarkOptions:
     seed: int = FIRST_SEED  # of the first flight; every second from there on
     guard: GuardSettings = field(default_factory=GuardSettings)
     out: Path | None = None
+    record: Path | None = None  # folder of flights that are kept
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +44,7 @@ class _Flight:
     condition: str
     seed: int
     guard: GuardSettings
+    folder: Path | None  # of its logs
 
 
 def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
@@ -47,6 +52,7 @@ def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
 
     Raises:
         PilotError: no such policy.
+        UserError: what is to be recorded cannot be.
     """
     benchmark = benchmark_of(options.task)
     benchmark.load(options.policy)  # refused before anything is flown
@@ -54,10 +60,11 @@ def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
     names = options.conditions or tuple(benchmark.titles)
     outcomes: dict[str, list[Any]] = {name: [] for name in names}
     flights = [
-        _Flight(options.task, options.policy, name, options.seed + 2 * k, options.guard)
+        _Flight(options.task, options.policy, name, seed, options.guard, _folder(options.record, name, seed))
         for name in names
-        for k in range(options.flights)
+        for seed in range(options.seed, options.seed + 2 * options.flights, 2)
     ]
+    _make_folders(flights)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     spawned = multiprocessing.get_context("spawn")
     with (
@@ -73,6 +80,8 @@ def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
     if options.out is not None:
         _write(options.out, options, _page(benchmark, rows, outcomes), outcomes)
         console.print(f"table and flights: {options.out}")
+    if options.record is not None:
+        print_line(console, f"recorded: {options.record}; honeyguide dataset build takes it")
     return outcomes
 
 
@@ -85,6 +94,23 @@ def _misses(benchmark: Benchmark, outcomes: dict[str, list[Any]]) -> list[str]:
     return [text for name, flown in outcomes.items() for text in benchmark.misses(name, flown)]
 
 
+def _folder(record: Path | None, condition: str, seed: int) -> Path | None:
+    return None if record is None else record / f"{condition}-seed{seed}"
+
+
+def _make_folders(flights: Sequence[_Flight]) -> None:
+    """Raises UserError if one is there already, or cannot be made."""
+    folders = [flight.folder for flight in flights if flight.folder is not None]
+    for folder in folders:
+        if folder.exists():
+            raise UserError(f"--record: {folder} is there already; name another folder")
+    try:
+        for folder in folders:
+            folder.mkdir(parents=True)
+    except OSError as error:
+        raise UserError(f"--record {error.filename}: cannot be made: {error.strerror}") from error
+
+
 @cache
 def _pilot(task: str, name: str) -> Any:
     return benchmark_of(task).load(name)
@@ -93,7 +119,11 @@ def _pilot(task: str, name: str) -> Any:
 def _flown(flight: _Flight) -> Any:
     """In a process of its own."""
     pilot = _pilot(flight.task, flight.policy)
-    return benchmark_of(flight.task).fly(pilot, flight.condition, flight.seed, flight.guard)
+    kept = KeptFlight(flight.folder, flight.policy)
+    try:
+        return benchmark_of(flight.task).fly(pilot, flight.condition, flight.seed, flight.guard, kept)
+    finally:
+        kept.close()
 
 
 def _shown(columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> Table:

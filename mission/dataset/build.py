@@ -11,10 +11,11 @@ from pathlib import Path
 from rich.console import Console
 
 from mission.console.terminal import print_line
-from mission.dataset.sources import FlightSource, has_truth, logs_at, read_flight
+from mission.dataset.source_logs import DAMAGED, damaged, logs_at, refuse_twice
+from mission.dataset.sources import FlightSource, has_truth, read_flight
 from mission.train.task_arguments import task_of
 from policies.datasets.decisions import Judge, episodes_of, runs_of
-from policies.datasets.episodes import DatasetError, DatasetOrigin, EpisodeRows
+from policies.datasets.episodes import NUMBER_NOTE, DatasetError, DatasetOrigin, EpisodeRows
 from policies.datasets.judges import HOVER, judge_of, task_pairs
 from policies.datasets.writer import DatasetWriter
 from policies.experts.demonstration_file import check_is_free
@@ -47,10 +48,16 @@ def build_dataset(options: BuildOptions, console: Console) -> None:
     check_is_free(options.out)
     pairs = task_pairs(options.task, options.env_args)
     logs = [log for source in options.sources for log in logs_at(source)]
+    refuse_twice(logs)
     task, settings = task_of(options.task, pairs, 1)
     numbers = _numbers(options.numbers)
     task.set_params(numbers)
-    notes = {f"number {name}": f"{value:g}" for name, value in numbers.items()}
+    notes = {f"{NUMBER_NOTE}{name}": f"{value:g}" for name, value in numbers.items()}
+    if options.task != HOVER:
+        _refuse_telemetry(logs)
+    for log in damaged(logs):
+        print_line(console, f"{log}: {DAMAGED}")
+        notes[f"log {log.absolute().parent.name}/{log.name}"] = DAMAGED
     if options.task == HOVER:
         from mission.dataset.build_hover import hover_episodes
 
@@ -91,14 +98,18 @@ def _numbers(pairs: tuple[str, ...]) -> dict[str, float]:
     return numbers
 
 
+def _refuse_telemetry(logs: list[Path]) -> None:
+    for log in logs:
+        if log.suffix == ".tlog":
+            raise DatasetError(f"{log}: a .tlog holds no topic policy_decision; build from the run's .ulg")
+
+
 def _read(log: Path, judge: Judge, *, by_truth: bool) -> FlightSource:
     """A log of the judge's task.
 
     Raises:
         DatasetError: it cannot be read, or holds decisions of another task, version or setting.
     """
-    if log.suffix == ".tlog":
-        raise DatasetError(f"{log}: a .tlog holds no topic policy_decision; build from the run's .ulg")
     source = read_flight(log, by_truth=by_truth)
     try:
         replace(judge.layout, stack=1).require(source.rows.layout, f"{log}: policy_decision")

@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 
 from mission.console.command_refusal import learn_extra, refuse
+from mission.console.interrupts import signals_interrupt
 from mission.console.name_checks import check_task
 from mission.console.terminal import loading
 
@@ -24,7 +25,7 @@ _Seed = Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of all draw
 
 @contextmanager
 def _refusing() -> Iterator[None]:
-    """What a user can get wrong gives one sentence."""
+    """What a user can get wrong gives one sentence, and whoever ends the command finds no half of a dataset."""
     with learn_extra():
         from mission.train.play import PlayError
         from mission.video.video_file import VideoError
@@ -36,7 +37,8 @@ def _refusing() -> Iterator[None]:
         from policies.tasks.task_params import NumberError
 
         try:
-            yield
+            with signals_interrupt():
+                yield
         except (DatasetError, DemonstrationFileError, LayoutError, NoExpert, NumberError, PlayError) as error:
             refuse(str(error))
         except (UnknownTask, VideoError) as error:

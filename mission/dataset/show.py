@@ -49,6 +49,8 @@ def _print(reader: DatasetReader, found: DatasetStatistics, console: Console) ->
         f"return {found.returns.mean():.2f} ± {found.returns.std():.2f}, {found.returns.min():.2f} to "
         f"{found.returns.max():.2f}; rewards by the {origin.rewards_by}",
     )
+    for name, text in origin.notes.items():
+        print_line(console, f"{name}: {text}")
     for title, elements in (("observations", found.observations), ("actions", found.actions)):
         console.print(_table(title, elements))
 

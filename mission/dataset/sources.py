@@ -29,24 +29,6 @@ from policies.tasks.layout import Layout
 Columns = dict[str, NDArray[Any]]
 
 
-def logs_at(path: Path) -> list[Path]:
-    """The logs that a path means: itself, those of a run's folder, or of the runs in a folder, by name.
-
-    Raises:
-        DatasetError: there is nothing, or no log.
-    """
-    if path.is_file():
-        return [path]
-    if not path.exists():
-        raise DatasetError(f"{path}: no such file or folder")
-    found = sorted(log for pattern in ("*.ulg", "*.tlog") for log in path.rglob(pattern))
-    with_ulog = {log.parent for log in found if log.suffix == ".ulg"}
-    logs = [log for log in found if log.suffix == ".ulg" or log.parent not in with_ulog]
-    if not logs:
-        raise DatasetError(f"{path}: no log there (.ulg or .tlog)")
-    return logs
-
-
 def read_log(path: Path, topics: Sequence[str]) -> ULog:
     """A ULog with these topics.
 

@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pyulog import ULog
 
-from mission.log.ulog_file import UlogDamage, read_topics
+from mission.log.ulog_file import MAGIC, UlogDamage, read_topics
 
 Rows = NDArray[Any]
-MAGIC = b"ULog\x01\x12\x35"
 ABSURD = 1e12  # no quantity that is plotted comes near it
 GAP_MAX_S = 60.0  # in a damaged log, what lies farther away is of no such time; guess
 PAUSE_MAX_S = 3600.0  # in any log: damage is not always noticed; guess

@@ -1,7 +1,8 @@
 """The decisions that a flight has logged, as arrays, and how they become episodes whoever judges them.
 
 A run is what was decided in a row by one pilot, without a gap. Its k-th action led to its next observation, so a run of
-n decisions has n - 1 steps. It ends where the task's own function says so, or is cut where the run ends.
+n decisions has n - 1 steps. It ends where the task's own function says so, or is cut where the run ends. A vehicle that
+stays at a goal it has reached begins no episode there.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -150,31 +151,67 @@ def episodes_of(
     if not runs:
         who = "" if has_others else " that the companion flew"
         raise DatasetError(f"{rows.source}: policy_decision holds no two decisions in a row{who}")
+    reached: Rows | None = None  # the goal at which it stays
     for chosen in runs:
+        if rows.is_first[chosen.start] and rows.is_flying[chosen.start]:
+            reached = None  # sent anew, be it to where it stands
         at = chosen.start
         while chosen.stop - at >= _LEAST:
             rest = slice(at, chosen.stop)
-            episode = _episode(rows.part(rest), judge, None if truth is None else truth.part(rest), images)
+            judged = _judged(rows.part(rest), judge, None if truth is None else truth.part(rest))
+            if reached is not None:
+                stayed, reached = _stay(judged, reached)
+                if stayed:
+                    at += stayed
+                    continue
+            episode = _episode(judged, judge.layout.stack, images)
             yield episode
             at += len(episode)
+            reached = judged.run.goal[len(episode) - 1] if episode.is_success else None
             if episode.is_terminated and not episode.is_success:
                 break  # whatever it does after it struck something
 
 
-def _episode(
-    run: DecisionRows, judge: Judge, truth: TruthRows | None, images: Callable[[Rows], NDArray[np.uint8] | None]
-) -> EpisodeRows:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Judged:
+    """Decisions with what they are worth."""
+
+    run: DecisionRows
+    actions: Rows
+    rewards: Rows  # of the steps, as the next
+    outcomes: Rows
+
+
+def _judged(run: DecisionRows, judge: Judge, truth: TruthRows | None) -> _Judged:
     if not np.isfinite(run.frame).all():
         raise DatasetError(f"{run.source}: policy_decision holds an observation that is no number")
     actions = judge.actions(run)
-    rewards, outcomes = judge.judged(run, actions, truth)
+    return _Judged(run, actions, *judge.judged(run, actions, truth))
+
+
+def _stay(judged: _Judged, reached: Rows) -> tuple[int, Rows]:
+    """For how many decisions it has no other goal than those that it has reached, and the last of these.
+
+    A goal that walks is another one each time; where the vehicle keeps up with it, it has reached that, too.
+    """
+    for k, outcome in enumerate(judged.outcomes.tolist()):
+        goal = judged.run.goal[k]
+        if outcome == Outcome.SUCCESS:
+            reached = goal
+        elif (goal != reached).any():
+            return k, reached
+    return len(judged.run), reached
+
+
+def _episode(judged: _Judged, stack: int, images: Callable[[Rows], NDArray[np.uint8] | None]) -> EpisodeRows:
+    run, outcomes = judged.run, judged.outcomes
     ended = np.flatnonzero(outcomes)
     steps = int(ended[0]) + 1 if len(ended) else len(outcomes)
     outcome = Outcome(int(outcomes[steps - 1]))
     return EpisodeRows(
-        observations=stacked(run.frame[: steps + 1], judge.layout.stack),
-        actions=actions[:steps],
-        rewards=rewards[:steps].astype(np.float64),
+        observations=stacked(run.frame[: steps + 1], stack),
+        actions=judged.actions[:steps],
+        rewards=judged.rewards[:steps].astype(np.float64),
         is_terminated=outcome is not Outcome.RUNNING and outcome is not Outcome.TIMEOUT,
         outcome="timeout" if outcome is Outcome.RUNNING else outcome.name.lower(),
         images=images(run.i_image[: steps + 1]),

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from policies.tasks.layout import Layout
 
+NUMBER_NOTE = "number "  # what notes of a task's numbers begin with
+
 
 class DatasetError(ValueError):
     """A dataset, or what it is to be made from, that cannot be used; the message is one sentence for the user."""

@@ -16,8 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.files import part_path
-from policies.learn.rollout.demonstrations import DemonstrationError, recorded_layout
+from policies.learn.rollout.demonstrations import (
+    DemonstrationError,
+    recorded_layout,
+    recorded_settings,
+)
 from policies.tasks.layout import Layout
+from policies.tasks.settings_difference import settings_difference
 
 CHUNK_ROWS = 65_536  # read and written at once
 _VERSION = 1  # of the table in cache files
@@ -105,12 +110,16 @@ def check_layouts(folders: Sequence[Path], layout: Layout | None) -> Layout:
     """The layout that all datasets were recorded with, which is that of the policy if there is one.
 
     Raises:
-        DemonstrationError: metadata that cannot be read.
+        DemonstrationError: metadata that cannot be read, or datasets of other settings than the first.
         LayoutError: recorded with another task or preset.
     """
     expected = layout or recorded_layout(folders[0])
+    settings = recorded_settings(folders[0])
     for folder in folders:
         expected.require(recorded_layout(folder), str(folder))
+        difference = settings_difference(expected.task, settings, recorded_settings(folder))
+        if difference:
+            raise DemonstrationError(f"{folder}: recorded with other settings than {folders[0]}: {difference}")
     return expected
 
 

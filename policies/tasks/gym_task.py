@@ -32,6 +32,8 @@ class GymSettings(TaskSettings):
 
     model_config = ConfigDict(extra="allow")
 
+    conditions: ClassVar = TaskSettings.conditions | {"vectorization"}
+
     preset: Literal[""] = ""  # type: ignore[assignment]  # there are none
     """There are none."""
     vectorization: Literal["sync", "async"] = "sync"

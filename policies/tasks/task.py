@@ -35,6 +35,10 @@ class TaskSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
+    conditions: ClassVar[frozenset[str]] = frozenset({"split", "stack"})
+    """Settings under other values of which recorded decisions may be learnt from: those of where and in what a task is
+    done, and those that the layout tells of."""
+
     preset: Preset = "as-coded"
     """`as-documented` (the text), `as-coded` (the published code) or `improved` (ours)."""
     split: Split = "train"

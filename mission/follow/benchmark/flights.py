@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mission.benchmark.benchmark import changed_per_min
+from mission.benchmark.kept_flight import KeptFlight
 from mission.flight_config import FlightConfig, OwnerConfig
 from mission.follow.benchmark.conditions import Condition
 from mission.follow.follow_scoring import FollowWatch
@@ -60,10 +61,19 @@ def flight_of(condition: Condition, seed: int) -> FlightConfig:
     return FlightConfig(owner=owner, world=world, seed=seed, wind_m_s=wind_m_s, airframe=condition.airframe)
 
 
-def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, seconds: float = SECONDS) -> Outcome:
+def fly(
+    pilot: Pilot,
+    condition: Condition,
+    seed: int,
+    guard: GuardSettings,
+    seconds: float = SECONDS,
+    kept: KeptFlight | None = None,
+) -> Outcome:
     """One flight; one that never began to follow did not follow at all."""
     pilot.reset()
-    flight, companion = flight_with_companion(flight_of(condition, seed), pilot, guard=guard)
+    kept = kept or KeptFlight()
+    flight, companion = flight_with_companion(flight_of(condition, seed), pilot, folder=kept.folder, guard=guard)
+    kept.begin(flight, companion)
     is_hidden: list[bool] = []
     has_touched = False
 

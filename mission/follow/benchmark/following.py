@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from mission.benchmark.benchmark import Benchmark
+from mission.benchmark.kept_flight import KeptFlight
 from mission.follow.benchmark.conditions import BY_NAME, LEAST_KEPT, LEAST_RESUMED, LEAST_STOOD
 from mission.follow.benchmark.flights import BACK_S, HOLD_S, Outcome, fly
 from mission.follow.benchmark.pilots import any_pilot
@@ -11,8 +12,8 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.skills.following import Pilot
 
 
-def _flown(pilot: Pilot, condition: str, seed: int, guard: GuardSettings) -> Outcome:
-    return fly(pilot, BY_NAME[condition], seed, guard)
+def _flown(pilot: Pilot, condition: str, seed: int, guard: GuardSettings, kept: KeptFlight) -> Outcome:
+    return fly(pilot, BY_NAME[condition], seed, guard, kept=kept)
 
 
 def _row(name: str, outcomes: Sequence[Outcome]) -> tuple[str, ...]:

@@ -151,9 +151,14 @@ class Guard:
             if phase_s < _SEARCH_ROUNDS_S:
                 return level + s.search_round_speed * np.array([-way[1], way[0]]) / far_m, down, yaw_rate
             return level, down, s.search_yaw_rate
-        if is_searching:
+        if is_searching or not self.senses.seen.sights:
             return np.zeros(2), down, s.search_yaw_rate
-        return np.zeros(2), down, self._facing(self.senses.bearing_rad, own)
+        return np.zeros(2), down, self._facing(self._last_bearing(own), own)
+
+    def _last_bearing(self, own: Own) -> float:
+        """To where the owner was going when they were seen last [rad], in ned."""
+        way = self.senses.seen.now(own.boot_us)[0][:2] - np.array(own.pos_ned[:2])
+        return atan2(way[1], way[0])
 
     def _facing_owner(self, own: Own, yaw_rate: float) -> float:
         """Towards where sights and phone put an owner who is not seen; a yaw rate if nobody knows."""

@@ -7,7 +7,7 @@ where others were met lately only whom phone and looks say.
 """
 
 from dataclasses import replace
-from math import atan2, inf, isfinite
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,8 +70,6 @@ class Senses:
         self.image_us = 0
         """When the newest image was taken."""
         self.heard_us: int | None = None
-        self.bearing_rad = 0.0
-        """In ned, where the owner was seen last."""
         self._first_us: int | None = None  # when the first image with somebody in it was taken
         self._row: list[Floats] = []  # where who may be the owner was in the last images
         self._others = OtherPeople()
@@ -113,7 +111,6 @@ class Senses:
             self.seen_us = image.time_us
             sight = _sight(seen, pose)
             place = sight.place_ned
-            self.bearing_rad = atan2(place[1] - pose.pos_ned[1], place[0] - pose.pos_ned[0])
             self.seen.see(sight, pose)
         owner_then = self._owner_then(image.time_us, own)
         if by_colours is None:
@@ -236,6 +233,8 @@ class Senses:
         gate_m = min(_GATE_M + _GATE_M_S * silence_s, _GATE_MAX_M)
         if silence_s < _GONE_S:
             return self.seen.now(time_us)[0], gate_m
+        if not self.is_heard and self.seen.sights:  # nobody says where they have gone since: as far as they could
+            return self.seen.now(time_us)[0], _GATE_M + _GATE_M_S * silence_s
         track = self.watch.track
         if self._phone_ned is not None and self.is_heard and self._others.met_us is not None:
             return self._phone_ned, max(gate_m if isfinite(silence_s) else 0.0, _PHONE_GATE_M)

@@ -15,7 +15,7 @@ from policies.learn.config.signals import GailSettings
 from policies.learn.export.policy_path import CheckpointError
 from policies.learn.networks.perception import require_privileged
 from policies.learn.networks.vision import LEAST_SIDES
-from policies.learn.rollout.demonstrations import DemonstrationError, check_demonstrations
+from policies.learn.rollout.demonstrations import DemonstrationError, check_demonstrations, check_settings
 from policies.tasks.catalogue import UnknownTask, build_task, settings_of, task_settings
 from policies.tasks.layout import Layout, LayoutError
 from policies.tasks.task import Task
@@ -81,8 +81,11 @@ def _check_demonstrations(loaded: Loaded, task: Task) -> None:
         paths["behavioral_cloning",] = behavior.behavioral_cloning.demo_path
     if behavior.offline is not None:
         with _refused_at(loaded, "behaviors", loaded.config.behavior_name, "offline", "dataset"):
+            name, pairs = loaded.config.env_settings.env_path or "", loaded.config.env_settings.env_args
+            settings = settings_of(name, pairs).model_dump(mode="json")
             for path in behavior.offline.dataset:
                 check_demonstrations(path, task.layout)
+                check_settings(path, name, settings)
     for block, path in paths.items():
         with _refused_at(loaded, "behaviors", loaded.config.behavior_name, *block, "demo_path"):
             check_demonstrations(path, task.layout)

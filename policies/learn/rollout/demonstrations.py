@@ -7,6 +7,7 @@ recorded with; another task or preset is refused.
 
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from policies.experts.demonstration_file import LAYOUT_KEY
+from policies.experts.demonstration_file import LAYOUT_KEY, SETTINGS_KEY
 from policies.learn.signals.signal import Transitions
 from policies.tasks.layout import Layout
+from policies.tasks.settings_difference import settings_difference
 
 _METADATA_FILE = "metadata.json"
 
@@ -78,6 +80,23 @@ def data_folders(demo_path: str) -> list[Path]:
     return folders
 
 
+def check_settings(demo_path: str, task: str, settings: Mapping[str, Any]) -> None:
+    """Makes sure that what was recorded at a path saw, did and was paid for the same as under these settings.
+
+    Args:
+        demo_path: of demonstrations that are there, of the task.
+        task: its name.
+        settings: of it, as JSON.
+
+    Raises:
+        DemonstrationError: recorded under others.
+    """
+    for folder in data_folders(demo_path):
+        difference = settings_difference(task, settings, recorded_settings(folder))
+        if difference:
+            raise DemonstrationError(f"{folder}: recorded with other settings: {difference}")
+
+
 _Episode = tuple[NDArray[Any], ...]
 
 
@@ -97,6 +116,21 @@ def recorded_layout(folder: Path) -> Layout:
     if recorded is None:
         raise DemonstrationError(f"{folder}: was not recorded by honeyguide (no {LAYOUT_KEY} in {_METADATA_FILE})")
     return recorded
+
+
+def recorded_settings(folder: Path) -> dict[str, Any]:
+    """The settings of the task that a dataset was recorded with, as JSON; none: it does not say.
+
+    Raises:
+        DemonstrationError: its metadata cannot be read.
+    """
+    try:
+        record = json.loads((folder / _METADATA_FILE).read_text(encoding="utf-8")).get(SETTINGS_KEY)
+        return dict(json.loads(record)) if record else {}
+    except (OSError, AttributeError, ValueError, TypeError) as error:
+        raise DemonstrationError(
+            f"{folder}: not a readable Minari dataset: {_METADATA_FILE}: {_first_line(error)}"
+        ) from error
 
 
 def _read_dataset(folder: Path, layout: Layout) -> list[_Episode]:

@@ -25,6 +25,8 @@ from policies.tasks.task import Task, TaskSettings
 class ModelSettings(TaskSettings):
     """What a user may choose of a model."""
 
+    conditions: ClassVar = TaskSettings.conditions | {"preset", "longest", "lost_penalty"}
+
     preset: Literal[""] = ""  # type: ignore[assignment]  # there are none
     """There are none."""
     longest: int = Field(default=0, ge=0)

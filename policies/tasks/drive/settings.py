@@ -1,6 +1,6 @@
 """Drive's settings: what is to be reached, and what a quick training may leave out."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from policies.tasks.task import TaskSettings
 
@@ -9,6 +9,8 @@ DrivePreset = Literal["reach", "park"]
 
 class DriveSettings(TaskSettings):
     """What a user may choose of Drive."""
+
+    conditions: ClassVar = TaskSettings.conditions | {"has_estimator"}
 
     preset: DrivePreset = "reach"  # type: ignore[assignment]  # of its own, not the documents'
     """`reach`: a pose 5 to 30 m away on a course through hills; `park`: a free spot of a car park."""

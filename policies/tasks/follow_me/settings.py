@@ -1,6 +1,6 @@
 """FollowMe's settings: the preset, and the choices it makes, each of which can be made by itself."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -14,6 +14,8 @@ Terrain = Literal["fresh", "kept"]
 
 class FollowSettings(TaskSettings):
     """What a user may choose of FollowMe."""
+
+    conditions: ClassVar = TaskSettings.conditions | {"owner", "has_estimator", "terrain", "image_size"}
 
     preset: FollowPreset = "improved"  # type: ignore[assignment]  # tasks have presets of their own
     """`as-documented` (the text), `improved` (ours) or `vision-only` (ours, without any word of where the owner is)."""

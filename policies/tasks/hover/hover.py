@@ -37,6 +37,8 @@ HoverPreset = Literal["improved"]
 class HoverSettings(TaskSettings):
     """What a user may choose of Hover."""
 
+    conditions: ClassVar = TaskSettings.conditions | {"has_estimator"}
+
     preset: HoverPreset = "improved"
     """`improved`: ours, the only one; no document describes this task."""
     has_estimator: bool = True

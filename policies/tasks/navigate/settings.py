@@ -1,6 +1,6 @@
 """Navigate's settings: what the policy sees the forest with, and what a quick training may leave out."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -12,6 +12,8 @@ Observation = Literal["rays", "depth"]
 
 class NavigateSettings(TaskSettings):
     """What a user may choose of Navigate."""
+
+    conditions: ClassVar = TaskSettings.conditions | {"has_estimator", "delay_ms", "image_size"}
 
     preset: NavigatePreset = "improved"
     """`improved`: ours, the only one; no document describes this task."""

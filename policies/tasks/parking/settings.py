@@ -6,7 +6,7 @@ An option left empty is as the preset has it. `Rules` carries the choices into t
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import warp as wp
 from pydantic import Field, field_validator
@@ -46,6 +46,16 @@ _ACTIONS = {
 
 class ParkingSettings(TaskSettings):
     """Of both levels."""
+
+    conditions: ClassVar = TaskSettings.conditions | {
+        "quarter",
+        "starts",
+        "goals",
+        "obstacles",
+        "resets",
+        "mirrored",
+        "storey",
+    }
 
     split: Literal["train", "validation", "test"] = "train"  # type: ignore[assignment]  # others have no `validation`
     """`train`, `test`, or `validation`, by which to choose among policies: disjoint sets of places of goals."""

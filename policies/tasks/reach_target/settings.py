@@ -1,6 +1,6 @@
 """ReachTarget's settings: variant and preset, and the options they choose, each of which can be chosen by itself."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -19,6 +19,8 @@ _IS_SHAPED = (False, True, True, True, False)
 
 class ReachSettings(TaskSettings):
     """What a user may choose of ReachTarget. `auto` is what the preset has."""
+
+    conditions: ClassVar = TaskSettings.conditions | {"start", "goals"}
 
     variant: int = Field(default=4, ge=0, le=4)
     """Which of the article's five agents; `improved` has one agent only and ignores it."""

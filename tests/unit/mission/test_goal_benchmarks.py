@@ -1,6 +1,7 @@
 """`honeyguide benchmark navigate` and `park`: any policy goes to goals, and what came of it is shown and written."""
 
 import json
+from dataclasses import asdict
 from math import nan
 
 import numpy as np
@@ -8,14 +9,17 @@ import pytest
 from typer.testing import CliRunner
 
 from mission.benchmark import navigating, parking
+from mission.benchmark.benchmark import TASKS, benchmark_of
 from mission.benchmark.goal_flights import Crossing
 from mission.benchmark.goal_pilots import goal_pilot
+from mission.benchmark.kept_flight import KeptFlight
 from mission.benchmark.parking import Parking, parked
 from mission.benchmark.session import misses
 from mission.cli import app
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.pilot import PilotError
 from policies.companion.vector_pilot import DrivingPilot, NavigationPilot
+from policies.datasets.reader import DatasetReader
 from policies.pretrained.pretrained_policies import pretrained
 
 
@@ -67,6 +71,31 @@ def test_a_flight_is_shown_and_written(task, condition, tmp_path):
     assert outcome["outcome"] in {"arrived", "there"}
     assert (record["task"], record["has_guard"], record["guard_settings"]) == (task, True, {"crown_m": 0.9})
     assert (out / "table.md").read_text().startswith("| condition |")
+
+
+@pytest.mark.parametrize(
+    ("task", "condition", "built_as"),
+    [("navigate", "200-late-0", ("Navigate",)), ("park", "calm", ("Drive", "--env-args", "preset=park"))],
+)
+def test_a_recorded_flight_goes_as_another_and_becomes_a_dataset(task, condition, built_as, tmp_path):
+    flights, out, dataset = (tmp_path / name for name in ("flights", "out", "set"))
+    words = ("--condition", condition, "--flights", "1", "--jobs", "1", "--seed", "500000", "--out", str(out))
+    result = honeyguide(task, *words, "--record", str(flights))
+    assert result.exit_code in {0, 1}, result.output
+    assert [path.name for path in flights.iterdir()] == [f"{condition}-seed500000"]
+    (recorded,) = json.loads((out / "flights.json").read_text())["flights"][condition]
+    benchmark = benchmark_of(task)
+    unrecorded = benchmark.fly(benchmark.load(TASKS[task][1]), condition, 500_000, GuardSettings(), KeptFlight())
+    assert recorded == asdict(unrecorded)
+    built = CliRunner().invoke(app, ["dataset", "build", str(flights), "-o", str(dataset), "--task", *built_as])
+    assert built.exit_code == 0, built.output
+    with DatasetReader(dataset) as reader:
+        (episode,) = list(reader)
+        assert reader.origin.rewards_by == "truth"
+    assert (episode.outcome, episode.context["pilot"]) == ("success", TASKS[task][1])
+    again = honeyguide(task, *words, "--record", str(flights))
+    assert again.exit_code == 2
+    assert f"--record: {flights / condition}-seed500000 is there already" in again.stderr
 
 
 def test_the_guard_keeps_a_rover_at_full_throttle_off_what_stands_round_it():

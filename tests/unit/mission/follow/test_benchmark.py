@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from common.airframe import load_airframe
+from mission.benchmark.kept_flight import KeptFlight
 from mission.benchmark.session import misses
 from mission.cli import app
 from mission.follow.benchmark.conditions import BY_NAME, CONDITIONS
@@ -16,6 +17,7 @@ from mission.follow.benchmark.pilots import any_pilot
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.names import FOLLOWER
 from policies.companion.pilot import PilotError
+from policies.datasets.reader import DatasetReader
 from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.follow_me.follow_me_params import FOLLOW_PARAMS
 from policies.tasks.follow_me.observe import EGO, TRACKED
@@ -86,6 +88,22 @@ def test_a_flight_is_shown_and_written(tmp_path):
     missed = [line.removeprefix("miss: ") for line in result.output.splitlines() if line.startswith("miss: ")]
     assert bool(missed) == bool(result.exit_code)
     assert all(f"- {text}\n" in table for text in missed)
+
+
+def test_a_recorded_flight_becomes_a_dataset(tmp_path):
+    kept = KeptFlight(tmp_path, "somebody")
+    fly(any_pilot(FOLLOWER), BY_NAME["walk"], 500_000, GuardSettings(), seconds=3.0, kept=kept)
+    kept.close()
+    dataset = tmp_path / "set"
+    words = ["dataset", "build", str(tmp_path), "--task", "FollowMe", "--images", "-o", str(dataset)]
+    built = CliRunner().invoke(app, words)
+    assert built.exit_code == 0, built.output
+    with DatasetReader(dataset) as reader:
+        (episode,) = list(reader)
+        assert reader.origin.rewards_by == "truth"
+    assert len(episode) > 25
+    assert len(episode.images) == len(episode) + 1
+    assert episode.context["pilot"] == "somebody"
 
 
 def test_the_guard_keeps_a_policy_that_flies_at_its_owner_off_them():

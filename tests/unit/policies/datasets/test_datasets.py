@@ -1,5 +1,7 @@
 """Datasets on disk: the same bytes for the same episodes, whole or not at all, and what is made of them."""
 
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
@@ -35,8 +37,9 @@ def episode(steps=5, seed=0, **more):
     )
 
 
-def written(folder, seeds=(0, 1, 2), layout=LAYOUT):
-    with DatasetWriter(folder, DatasetOrigin(layout, {"preset": "improved"}, "test")) as writer:
+def written(folder, seeds=(0, 1, 2), layout=LAYOUT, notes=None, **settings):
+    origin = DatasetOrigin(layout, {"preset": "improved"} | settings, "test", notes=notes or {})
+    with DatasetWriter(folder, origin) as writer:
         writer.add_all(episode(5 + seed, seed) for seed in seeds)
     return folder
 
@@ -123,6 +126,30 @@ def test_another_version_is_not_merged(tmp_path):
     assert not (tmp_path / "both").exists()
 
 
+@pytest.mark.parametrize(
+    ("one", "other", "sentence"),
+    [
+        ({"preset": "reach"}, {"preset": "park"}, "preset is park there and reach here"),
+        ({"reward": ""}, {"reward": "progress"}, "reward is progress there and as the preset has it here"),
+        ({"notes": {"number kept_m": "4"}}, {}, "number kept_m is the task's own there and 4 here"),
+    ],
+)
+def test_what_was_recorded_with_other_settings_is_not_merged(tmp_path, one, other, sentence):
+    one, other = written(tmp_path / "one", **one), written(tmp_path / "other", **other)
+    with pytest.raises(DatasetError) as refused:
+        merge([one, other], tmp_path / "both")
+    assert str(refused.value) == f"{other}: recorded with other settings than {one}: {sentence}"
+    assert not (tmp_path / "both").exists()
+
+
+def test_conditions_may_differ_and_are_noted(tmp_path):
+    one = written(tmp_path / "one", has_estimator=True, split="train", notes={"from": "here"})
+    other = written(tmp_path / "other", (3,), has_estimator=False, split="train", notes={"by": "hand"})
+    assert merge([one, other], tmp_path / "both") == 4
+    with DatasetReader(tmp_path / "both") as reader:
+        assert reader.origin.notes == {"from": "here", "by": "hand", "setting has_estimator": "True, False"}
+
+
 def test_a_filter_keeps_what_passes_and_refuses_to_keep_nothing(tmp_path):
     whole = written(tmp_path / "whole", range(5))
     assert keep(whole, tmp_path / "good", lambda each: each.is_success) == 3
@@ -135,6 +162,15 @@ def test_a_split_that_leaves_a_part_empty_is_refused(tmp_path):
     whole = written(tmp_path / "whole")
     with pytest.raises(DatasetError, match="leaves one part without any"):
         split(whole, 0.01, 0, (tmp_path / "a", tmp_path / "b"))
+
+
+def test_a_split_into_one_folder_is_refused_before_anything_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    whole = written(tmp_path / "whole")
+    for twice in ((Path("part"), Path("part")), (Path("part"), tmp_path / "part")):
+        with pytest.raises(DatasetError, match="part: a split makes two folders, and this one is named twice"):
+            split(whole, 0.5, 0, twice)
+    assert [path.name for path in tmp_path.iterdir()] == ["whole"]
 
 
 def test_a_folder_that_is_no_dataset_is_refused(tmp_path):

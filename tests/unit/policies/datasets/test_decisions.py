@@ -104,6 +104,50 @@ def test_navigate_pays_the_way_and_ends_at_the_goal(navigate):
     assert np.allclose(episode.actions[:, 0], 4.0 / 7.0)
 
 
+def stays(judge, n, **columns):
+    """Navigate's vehicle goes north at 4 m/s from 20 m before its goal, and from 3 m before it rests there."""
+    rows = decisions(judge.layout, n, speed=4.0, **columns)
+    rows.pos_ned[43:, 0] = rows.pos_ned[43, 0]
+    return rows
+
+
+def test_what_stays_at_its_goal_begins_no_episode_there(navigate):
+    (episode,) = episodes_of(stays(navigate, 200), navigate, None)
+    assert (episode.outcome, len(episode)) == ("success", 43)
+    jittering = stays(navigate, 200)
+    jittering.pos_ned[60::2, 0] -= 1.0  # out of the radius and in again
+    assert [len(each) for each in episodes_of(jittering, navigate, None)] == [43]
+    interrupted = stays(navigate, 200)
+    interrupted.time_us[100:] += 900_000  # decisions are missing: it stands there still
+    assert [len(each) for each in episodes_of(interrupted, navigate, None)] == [43]
+
+
+def test_another_goal_begins_an_episode(navigate):
+    rows = stays(navigate, 200)
+    rows.goal[120:, 0] = 60.0
+    first, second = episodes_of(rows, navigate, None)
+    assert (first.outcome, len(first)) == ("success", 43)
+    assert (second.outcome, len(second), second.context["start_us"]) == ("timeout", 79, rows.time_us[120])
+
+
+def test_what_is_sent_to_where_it_stands_is_there_in_one_step(navigate):
+    rows = stays(navigate, 200)
+    rows.is_first[120] = 1
+    assert [(each.outcome, len(each)) for each in episodes_of(rows, navigate, None)] == [
+        ("success", 43),
+        ("success", 1),
+    ]
+
+
+def test_what_keeps_up_with_a_goal_that_walks_begins_an_episode_when_it_falls_behind(navigate):
+    rows = decisions(navigate.layout, 100, speed=2.0)
+    rows.goal[:, 0] = rows.pos_ned[:, 0] + 1.0
+    rows.goal[60:, 0] += 10.0
+    first, second = episodes_of(rows, navigate, None)
+    assert (first.outcome, len(first)) == ("success", 1)
+    assert (second.outcome, second.context["start_us"]) == ("timeout", rows.time_us[60])
+
+
 def test_what_a_rover_ignores_of_an_action_stays_as_it_was_asked():
     judge = NavigateJudge(task_of("NavigateRover"))
     asked = np.tile(np.array([2.0 / 7.0, 0.0, 0.3, -0.4], np.float32), (12, 1))
@@ -133,7 +177,7 @@ def test_drive_ends_standing_in_its_pose():
     n = 20
     rows = decisions(judge.layout, n, goal=(0.0, 0.0, 0.0), speed=0.0)
     rows.pos_ned[:, 2] = 0.0
-    episode = next(iter(episodes_of(rows, judge, None)))
+    (episode,) = episodes_of(rows, judge, None)
     assert (episode.outcome, len(episode)) == ("success", 1)
     rows = decisions(judge.layout, n, goal=(50.0, 0.0, 0.0), speed=1.0)
     (episode,) = episodes_of(rows, judge, None)

@@ -96,6 +96,15 @@ def test_an_owner_who_comes_back_elsewhere_is_nobody_else(scene: Scene) -> None:
     assert scene.silence_s == 0.0
 
 
+def test_without_a_phone_the_owner_may_have_turned_and_walked_on_while_gone() -> None:
+    scene = Scene(hears=False)
+    for k in range(10):
+        scene.look((3.0 + 0.14 * k, 0.0))
+    scene.look(times=150)
+    scene.look((2.0, -11.0), times=10)
+    assert scene.silence_s == 0.0
+
+
 def pass_by(scene: Scene) -> None:
     """Somebody walks past an owner three metres ahead, whose phone says so."""
     for k in range(60):

@@ -1,0 +1,91 @@
+"""`honeyguide dataset build`: the logs that it refuses before it reads them, and those that it tells are not whole."""
+
+import shutil
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from common.logs.ulog import UlogWriter
+from mission.cli import app
+from mission.log.ulog_file import is_whole
+from policies.companion.decision_log import TOPIC, topic_fields, topic_info
+from policies.companion.vector_pilot import NavigationPilot
+from policies.datasets.reader import DatasetReader
+
+LAYOUT = NavigationPilot.task
+
+
+def built(*words):
+    return CliRunner().invoke(app, ["dataset", "build", *map(str, words)])
+
+
+def refused(*words):
+    result = built(*words)
+    assert result.exit_code == 2, result.output
+    (line,) = result.stderr.strip().splitlines()
+    return line.removeprefix("honeyguide: ")
+
+
+def logged(path, count=200):
+    """A companion's log: decisions of a vehicle that goes north, whose goal is far."""
+    path.parent.mkdir(exist_ok=True)
+    log = UlogWriter(path, 0, topic_info(LAYOUT, "somebody", ()), {})
+    topic = log.add_topic(TOPIC, topic_fields(LAYOUT))
+    frame, still = np.zeros(LAYOUT.frame_size), [0.0] * 4
+    for k in range(count):
+        pos_ned, vel_ned, goal = (0.1 * k, 0.0, -2.0), (1.0, 0.0, 0.0), (500.0, 0.0, -2.0)
+        motion = (*still, *still, *still, *pos_ned, *vel_ned, *goal)
+        topic.write_row(100_000 * (k + 1), 0, *frame, *motion, 0.0, -1, True, k == 0, 0, 0)
+    log.close()
+    return path
+
+
+@pytest.mark.parametrize("task", ["Drive", "FollowMe", "Navigate"])
+def test_a_telemetry_log_holds_no_decisions(tmp_path, task):
+    log, out = tmp_path / "flight.tlog", tmp_path / "set"
+    log.write_bytes(bytes(100))
+    line = refused(log, "--task", task, "-o", out)
+    assert line == f"{log}: a .tlog holds no topic policy_decision; build from the run's .ulg"
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("other", ["run/decisions.ulg", "run", "copy.ulg"])
+def test_a_log_that_is_given_twice_is_refused(tmp_path, other):
+    log, out = logged(tmp_path / "run" / "decisions.ulg"), tmp_path / "set"
+    shutil.copy(log, tmp_path / "copy.ulg")
+    line = refused(log, tmp_path / other, "--task", "Navigate", "-o", out)
+    twice = tmp_path / other if other.endswith(".ulg") else log
+    assert line == f"{twice}: holds the same as {log}, which is given too"
+    assert not out.exists()
+
+
+def test_a_log_that_was_cut_off_is_built_of_and_said_to_be(tmp_path):
+    whole = logged(tmp_path / "whole" / "decisions.ulg")
+    content = whole.read_bytes()
+    cut = tmp_path / "cut" / "decisions.ulg"
+    cut.parent.mkdir()
+    cut.write_bytes(content[: len(content) // 2])
+    steps = {}
+    for log in (whole, cut):
+        out = tmp_path / f"{log.parent.name}-set"
+        result = built(log, "--task", "Navigate", "-o", out)
+        assert result.exit_code == 0, result.output
+        warning = "is damaged or cut off: only what can be read of it counts"
+        assert (f"{log}: {warning}" in result.output.splitlines()) == (log == cut)
+        with DatasetReader(out) as reader:
+            assert reader.origin.notes == ({"log cut/decisions.ulg": warning} if log == cut else {})
+            steps[log] = reader.steps
+    assert 50 < steps[cut] < steps[whole] == 199
+
+
+def test_a_log_is_whole_up_to_the_end_of_a_message(tmp_path):
+    content = logged(tmp_path / "decisions.ulg", 3).read_bytes()
+    path = tmp_path / "part.ulg"
+    found = []
+    for size in range(len(content) - 300, len(content) + 1):
+        path.write_bytes(content[:size])
+        found.append(is_whole(path))
+    assert (found[0], found[-1], sum(found)) == (False, True, 1)
+    path.write_bytes(content + b"\x05\x00~12345")  # a message of a kind that there is not
+    assert not is_whole(path)
