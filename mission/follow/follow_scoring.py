@@ -27,6 +27,7 @@ VISIBLE_M = STATURE_M * IMAGE_SIZE / (PIXELS_LEAST * 2.0 * tan(radians(0.5 * HFO
 """Farther away a person is less than two pixels high: a policy cannot tell them from a trunk (guess)."""
 _SAMPLE_US = round(DECISION_S * 1e6)
 _BEFORE = (Mode.TAKEOFF, Mode.HOLD)  # on the way to being followed
+_OWN = (Phase.HANDING_BACK, Phase.REGAINING, Phase.ENGAGING)  # in which the mode is the companion's
 
 
 def taken_over(flight: FlightBase, phase: Phase, *, has_begun: bool, is_put_back: bool) -> str:
@@ -44,7 +45,7 @@ def taken_over(flight: FlightBase, phase: Phase, *, has_begun: bool, is_put_back
         return "the vehicle was restarted"
     state = flight.controller.state
     is_offboard = flight.controller.modes[state.mode].is_offboard
-    is_own = is_offboard or phase is Phase.HANDING_BACK or (state.mode in _BEFORE and not has_begun)
+    is_own = is_offboard or phase in _OWN or (state.mode in _BEFORE and not has_begun)
     if is_own or state.is_failsafe or not state.is_armed:
         return ""
     return f"mode {state.mode.name.replace('_', ' ').title()} was chosen"
