@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test-missions fly mission park train-demo reproduce-cars test test-all test-bare test-hostile test-mavproxy test-ardupilot test-px4 test-betaflight test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow reproduce-drive reproduce-navigate reproduce-navigate-rover reproduce-offline
+.PHONY: help setup test-missions repeat-missions fly mission park train-demo reproduce-cars test test-all test-bare test-ray test-hostile test-mavproxy test-ardupilot test-px4 test-betaflight test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow reproduce-drive reproduce-navigate reproduce-navigate-rover reproduce-offline
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -33,6 +33,10 @@ park: $(STAMP) ## Let a rover park by a learned policy while you watch; flags: m
 
 test-missions: $(STAMP) ## Fly the scenarios that ship, faster than real time; flags: make test-missions ARGS="--quiet"
 	@$(BIN)/honeyguide test --ready $(ARGS)
+
+REPEATS ?= 20
+repeat-missions: $(STAMP) ## Fly each scenario that ships twenty times, and see that its logs are the same bytes: REPEATS=2
+	@$(BIN)/python -m bench.flying.scenarios $(REPEATS)
 
 train-demo: $(STAMP) ## Train Parking1 from nothing while you watch, then look at what it learnt; flags: ARGS="--seed 7"
 	@$(BIN)/honeyguide train Parking1 --run-id train-demo --force $(ARGS)
@@ -86,6 +90,10 @@ test-hostile: $(STAMP) ## Foreign websites, crowds, the silent and the slow at e
 
 test-bare: $(STAMP) ## Install the wheel without extras in an environment of its own, and fly (downloads 150 MB once)
 	$(BIN)/python -m pytest -q tests/system/commands/test_installing.py -k bare $(ARGS)
+
+test-ray: $(STAMP) ## Fly a campaign and collect a dataset on a Ray head, and kill its workers (installs the extra ray, 240 MB)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[ray]"
+	$(BIN)/python -m pytest -q tests/system/campaigns tests/system/datasets -k ray $(ARGS)
 
 MAVPROXY := .venv-mavproxy
 

@@ -56,7 +56,10 @@ class Guard:
 
     def release(self) -> None:
         """A pilot has taken over, or the flight is over."""
-        self._commander.state.is_failsafe = False
+        commander = self._commander
+        if commander.state.is_failsafe:
+            commander.state.is_failsafe = False
+            commander.announcer.heartbeat_now()  # also where the mode stays: who watches is to know at once
         self._action = self._waiting = Action.WARN
 
     def refusal(self, mode: Mode) -> str:

@@ -2,8 +2,9 @@
 
 Stages that are done (results/follow/STAGE-SEED.json) are kept and stopped ones go on; `--again` trains them anew,
 `--page` only writes the page, `--shipped` takes what the shipped page was made of (docs/results/follow.jsonl) as done.
-Two processes go side by side, each on a core of its own; a stage waits for those it needs, and one that takes several
-cores for all others to end.
+Policies stay in results/follow/; `--publish` puts those of the first seed in the place of those that ship, without
+asking whether they are better: look at the page first. Two processes go side by side, each on a core of its own; a
+stage waits for those it needs, and one that takes several cores for all others to end.
 """
 
 import shutil
@@ -36,6 +37,9 @@ def main(
     again: Annotated[bool, typer.Option("--again", help="Train the named stages and those after them anew.")] = False,
     page: Annotated[bool, typer.Option("--page", help="Train nothing, only write the page.")] = False,
     shipped: Annotated[bool, typer.Option("--shipped", help="Take the shipped page's results as done.")] = False,
+    publish: Annotated[
+        bool, typer.Option("--publish", help="Put the first seed's policies in the place of those that ship.")
+    ] = False,
 ) -> None:
     unknown = [name for name in names or () if name not in STAGES]
     if unknown:
@@ -56,7 +60,8 @@ def main(
     path = write_page(there)
     write_all(RUNS, [result for runs in there.values() for result in runs])
     console.print(f"wrote {path}")
-    _publish()
+    for line in published(RESULTS, PRETRAINED) if publish else unpublished(RESULTS, PRETRAINED):
+        console.print(line, markup=False)
     for name in failed:
         console.print(f"[red]failed[/red] {name}: see {RESULTS / name}.log")
     raise typer.Exit(1 if failed else 0)
@@ -78,12 +83,30 @@ def _fetch(result: Result) -> None:
         write_whole(policy_path(RESULTS, result.stage, 1), shipped.read_bytes())
 
 
-def _publish() -> None:
-    """Puts the first seed's policies into policies/pretrained/, under the names of their recipes."""
-    for stage in STAGES.values():
-        trained = policy_path(RESULTS, stage.name, 1)
-        if stage.ships and trained.exists():
-            write_whole(PRETRAINED / f"{stage.recipe}.pt", trained.read_bytes())
+def published(results_folder: Path, pretrained: Path) -> list[str]:
+    """Puts the first seed's policies among those that ship, under the names of their recipes; says which."""
+    lines = []
+    for trained, ships in _new(results_folder, pretrained):
+        write_whole(ships, trained.read_bytes())
+        lines.append(f"{ships.name}: ships now what lies in {trained}")
+    return lines
+
+
+def unpublished(results_folder: Path, pretrained: Path) -> list[str]:
+    """A line for each of these policies that is another than the one that ships, which stays."""
+    new = _new(results_folder, pretrained)
+    return [f"{trained}: is another than {ships.name}, which still ships: --publish" for trained, ships in new]
+
+
+def _new(results_folder: Path, pretrained: Path) -> list[tuple[Path, Path]]:
+    """The first seed's policies of stages that ship, and the files that they would be in the place of."""
+    stages = [stage for stage in STAGES.values() if stage.ships]
+    pairs = [(policy_path(results_folder, stage.name, 1), pretrained / f"{stage.recipe}.pt") for stage in stages]
+    return [
+        (trained, ships)
+        for trained, ships in pairs
+        if trained.exists() and not (ships.exists() and ships.read_bytes() == trained.read_bytes())
+    ]
 
 
 def _jobs(names: Sequence[str], seeds: int) -> list[Job]:

@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 from pydantic import Field, model_validator
 
 from mission.campaign.distributions import Distribution
-from mission.scenario.parts.part import Finite, OneOf, Part, Short
+from mission.scenario.parts.part import FileName, Finite, OneOf, Part, Short
 from mission.scenario.scenario import Scenario
 
 SEED_KEY = "seed"
@@ -57,7 +57,7 @@ class Search(OneOf):
 class Campaign(Part):
     """One campaign."""
 
-    name: str = ""
+    name: FileName = ""
     """Left out: the file's."""
     about: str = ""
     """What it is to show, in a sentence."""

@@ -27,6 +27,7 @@ VISIBLE_M = STATURE_M * IMAGE_SIZE / (PIXELS_LEAST * 2.0 * tan(radians(0.5 * HFO
 """Farther away a person is less than two pixels high: a policy cannot tell them from a trunk (guess)."""
 _SAMPLE_US = round(DECISION_S * 1e6)
 _BEFORE = (Mode.TAKEOFF, Mode.HOLD)  # on the way to being followed
+_OWN = (Phase.HANDING_BACK, Phase.REGAINING, Phase.ENGAGING)  # in which the mode is the companion's
 
 
 def taken_over(flight: FlightBase, phase: Phase, *, has_begun: bool, is_put_back: bool) -> str:
@@ -44,7 +45,7 @@ def taken_over(flight: FlightBase, phase: Phase, *, has_begun: bool, is_put_back
         return "the vehicle was restarted"
     state = flight.controller.state
     is_offboard = flight.controller.modes[state.mode].is_offboard
-    is_own = is_offboard or phase is Phase.HANDING_BACK or (state.mode in _BEFORE and not has_begun)
+    is_own = is_offboard or phase in _OWN or (state.mode in _BEFORE and not has_begun)
     if is_own or state.is_failsafe or not state.is_armed:
         return ""
     return f"mode {state.mode.name.replace('_', ' ').title()} was chosen"
@@ -92,6 +93,7 @@ class FollowWatch:
         who = [cast.params, cast.people, cast.bystanders, cast.drawn]
         self._inputs = [rig.worlds, rig.i_world, rig.truth, *who, int(flight.drives), touch_m, self._out]
         self._rows: list[NDArray[np.float32]] = []
+        self._sampled_us: list[int] = []  # of the flight, when each row was
         self._motion: list[tuple[float, float, float]] = []  # north, east [m/s], yaw rate [rad/s], of each row
         self._start_us = -1  # of the flight, when it began to follow; -1: not yet
         self._frame_us = 0  # when the last frame was
@@ -155,9 +157,15 @@ class FollowWatch:
         is_due = self._judged_us >= (len(self._rows) + 1) * _SAMPLE_US
         if is_due or has_collided or (is_left and not self._rows):
             self._rows.append(self._row.copy())
+            self._sampled_us.append(self._flight.time_us)
             truth = self._flight.rig.rows["truth"][0]
             north, east, _ = truth["vel_ned"].tolist()
             self._motion.append((north, east, float(truth["omega_frd"][2])))
+
+    @property
+    def sampled_s(self) -> NDArray[np.float64]:
+        """Simulated time of each sample."""
+        return 1e-6 * np.array(self._sampled_us, dtype=np.float64)
 
     @property
     def motion(self) -> NDArray[np.float64]:

@@ -38,19 +38,34 @@ class ScenarioItem(pytest.Item):
         self._scenario, self._seed = scenario, seed
 
     def runtest(self) -> None:
-        from mission.scenario.session import Planned, failure_lines, fly
+        from mission.pytest_plugin.refusal import refused
+        from mission.scenario.one_run import Planned, failure_lines, fly
 
         if self.config.getoption("link"):
             pytest.skip("scenario files are flown in simulation, not over --link")
-        keep: Path | None = self.config.getoption("honeyguide_keep")
+        with refused():
+            folder = self._folder()
         planned = Planned(
-            self._scenario, str(self.path), self._seed, keep, keeps_all=self.config.getoption("honeyguide_keep_all")
+            self._scenario, str(self.path), self._seed, folder, keeps_all=self.config.getoption("honeyguide_keep_all")
         )
         flown = fly(planned)
         if flown.refusal or flown.result is None:
             pytest.fail(flown.refusal, pytrace=False)
         if not flown.result.passed:
             raise ScenarioFailed("\n".join(failure_lines(flown)))
+
+    def _folder(self) -> Path | None:
+        """Where it is kept; None: nowhere."""
+        from mission.scenario.keeping import check_apart, run_folder, run_names
+
+        keep: Path | None = self.config.getoption("honeyguide_keep")
+        if keep is None:
+            return None
+        names = {each.path: each._scenario.name for each in self.session.items if isinstance(each, ScenarioItem)}
+        kept_as = dict(zip(names, run_names(list(names.items())), strict=True))
+        folder = run_folder(keep, kept_as[self.path], self._seed)
+        check_apart([folder], [self.path])
+        return folder
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         if isinstance(excinfo.value, ScenarioFailed):

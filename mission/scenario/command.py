@@ -14,7 +14,7 @@ from mission.console.terminal import loading
 if TYPE_CHECKING:
     from mission.scenario.scenario_file import ScenarioFile
 
-SEED_MAX = 2**31 - 1
+RUN_MAX_S = 1800.0  # wall clock: ten minutes of many vehicles or of a policy take minutes
 
 
 def fly_scenarios(
@@ -26,6 +26,9 @@ def fly_scenarios(
         str | None, typer.Option(help="Fly each with these, as 1,2,3. Default: those of the scenario.")
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes at a time. Default: one per core.")] = None,
+    run_max: Annotated[
+        float, typer.Option(min=1.0, help="A run that takes longer [s, wall clock] hangs, and has failed.")
+    ] = RUN_MAX_S,
     junit: Annotated[Path | None, typer.Option(help="Write JUnit XML.")] = None,
     keep: Annotated[Path | None, typer.Option(help="Folder where runs that fail are kept, with logs.")] = None,
     keep_all: Annotated[bool, typer.Option("--keep-all", help="Keep those that pass, too.")] = False,
@@ -58,16 +61,15 @@ def fly_scenarios(
         with learn_extra():
             with loading(Console(stderr=True)):
                 from mission.scenario.flight.building import check_scenario
-                from mission.scenario.session import Planned, scenario_session
+                from mission.scenario.one_run import planned_runs
+                from mission.scenario.session import scenario_session
 
                 for file in scenarios:
                     check_scenario(file.scenario, str(file.path))
-            planned = [
-                Planned(file.scenario, str(file.path), seed, keep, keeps_all=keep_all, has_mcap=mcap)
-                for file in scenarios
-                for seed in chosen or file.scenario.seeds
-            ]
-            code = scenario_session(planned, jobs or len(os.sched_getaffinity(0)), junit=junit, is_quiet=quiet)
+            planned = planned_runs(scenarios, chosen, keep, keeps_all=keep_all, has_mcap=mcap)
+            count = jobs or len(os.sched_getaffinity(0))
+            _check_written(keep, junit)
+            code = scenario_session(planned, count, run_max, junit=junit, is_quiet=quiet)
     except UserError as error:
         refuse(str(error))
     raise typer.Exit(code)
@@ -86,8 +88,30 @@ def _that_can_be_flown(files: list["ScenarioFile"]) -> list["ScenarioFile"]:
     return [file for file in files if file not in left_out]
 
 
+def _check_written(keep: Path | None, junit: Path | None) -> None:
+    """Refuses, before anything is flown, a folder and a file that cannot be written after it."""
+    from common.files import part_path
+    from mission.console.option_checks import UserError
+
+    option = f"--keep {keep}"
+    try:
+        if keep is not None:
+            keep.mkdir(parents=True, exist_ok=True)
+            (keep / ".part").touch()
+            (keep / ".part").unlink()
+        option = f"--junit {junit}"
+        if junit is not None:
+            if junit.is_dir():
+                raise UserError(f"{option}: is a folder")
+            part_path(junit).touch()
+            part_path(junit).unlink()
+    except OSError as error:
+        raise UserError(f"{option}: cannot be written: {error.strerror}") from error
+
+
 def _seeds(text: str) -> tuple[int, ...]:
     from mission.console.option_checks import UserError
+    from mission.scenario.scenario import SEED_MAX
 
     try:
         seeds = tuple(int(part) for part in text.split(","))

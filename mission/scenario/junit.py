@@ -1,4 +1,7 @@
-"""Results as JUnit XML, which continuous integration shows: a suite for each run, a case for each check."""
+"""Results as JUnit XML, which continuous integration shows: a suite for each run, a case for each check.
+
+What was not flown to its end, or cannot be flown, is an error.
+"""
 
 from collections.abc import Sequence
 from math import isfinite

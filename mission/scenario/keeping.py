@@ -2,6 +2,9 @@
 
 import shlex
 import shutil
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +20,43 @@ from mission.world.world_copies import keep_world_file
 COPIED = (".plan", ".waypoints", ".toml", ".py")
 
 
-def run_folder_of(keep: Path, scenario: Scenario, seed: int) -> Path:
-    """Where a run is kept, empty.
+def run_names(files: Sequence[tuple[Path, str]]) -> list[str]:
+    """What the runs of scenarios are kept as: the scenario's name, behind as much of the path as sets equal ones apart.
+
+    Args:
+        files: each another, with the name of its scenario.
+    """
+    names = [name for _, name in files]
+    where = [(*path.resolve().parts[1:-1], path.name.removesuffix(SUFFIX)) for path, _ in files]
+    where = [parts[:-1] if parts[-1] == name else parts for parts, name in zip(where, names, strict=True)]
+    found = names
+    for depth in range(1, 1 + max(map(len, where), default=0)):
+        counts = Counter(found)
+        if len(counts) == len(found):
+            break
+        found = [
+            "-".join((*parts[-depth:], name)) if counts[chosen] > 1 else chosen
+            for chosen, parts, name in zip(found, where, names, strict=True)
+        ]
+    return found
+
+
+def run_folder(keep: Path, name: str, seed: int) -> Path:
+    """Where a run is kept."""
+    return keep / f"{name}-seed{seed}"
+
+
+def check_apart(folders: Iterable[Path], files: Iterable[Path]) -> None:
+    """Refuses to keep runs where a scenario is read from: what lies there would be taken away.
 
     Raises:
-        UserError: something else is there.
+        UserError: a file is in one of the folders.
     """
-    return emptied(keep / f"{scenario.name}-seed{seed}")
+    taken = {folder.resolve(): folder for folder in folders}
+    for file in files:
+        for parent in file.resolve().parents:
+            if parent in taken:
+                raise UserError(f"{file}: the run would be kept in {taken[parent]}, where it is: keep it elsewhere")
 
 
 def emptied(folder: Path) -> Path:
@@ -67,5 +100,8 @@ def _copied(value: str, folder: Path) -> str:
     path = Path(file)
     if path.suffix not in COPIED or not path.is_file():
         return value
-    shutil.copyfile(path, folder / path.name)
-    return f"{path.name}{colon}{function}"
+    copy = folder / path.name
+    if copy.is_file() and copy.read_bytes() != path.read_bytes():  # another vehicle's, from another folder
+        copy = folder / f"{path.stem}_{sha256(path.read_bytes()).hexdigest()[:8]}{path.suffix}"
+    shutil.copyfile(path, copy)
+    return f"{copy.name}{colon}{function}"

@@ -154,8 +154,13 @@ class UnderWay:
             figures=dict(run.figures),
         )
         if folder is not None:
-            write_whole(folder / RESULT_FILE, (json.dumps(result.as_json(), indent=1) + "\n").encode())
+            write_result(folder, result)
         return result
+
+
+def write_result(folder: Path, result: ScenarioResult) -> None:
+    """Writes the result of a run beside its logs."""
+    write_whole(folder / RESULT_FILE, (json.dumps(result.as_json(), indent=1) + "\n").encode())
 
 
 def _run_of(scenario: Scenario, built: Built) -> Run:
@@ -200,7 +205,7 @@ def _python(text: str, run: Run, vehicle: VehicleRun) -> Any:
             await (function(vehicle.drone, run) if has_run else function(vehicle.drone))
         except ScriptError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             own = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in text]
             raise ScriptError(
                 f"{text}, line {own[-1].lineno if own else 0}: {type(error).__name__}: {error}"
@@ -226,7 +231,7 @@ def function_of(text: str) -> Callable[..., Any]:
     sys.path.insert(0, str(path.parent))
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise UserError(f"{file}: cannot be imported: {type(error).__name__}: {error}") from error
     finally:
         sys.path.remove(str(path.parent))
@@ -268,4 +273,4 @@ def _error(run: Run, faults: FaultTimeline) -> str:
     return "; ".join(found)
 
 
-__all__ = ["RESULT_FILE", "ScriptError", "function_of", "run_scenario"]
+__all__ = ["RESULT_FILE", "ScriptError", "function_of", "run_scenario", "write_result"]

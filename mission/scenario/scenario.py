@@ -16,11 +16,12 @@ from mission.console.option_checks import UserError
 from mission.flight_settings import EngineName, Pace
 from mission.scenario.parts.checks import Check
 from mission.scenario.parts.faults import Fault
-from mission.scenario.parts.part import Finite, Key, KeyRefusal, Part, Place
+from mission.scenario.parts.part import FileName, Finite, Key, KeyRefusal, Part, Place
 from mission.scenario.parts.steps import Step
 
 WorldName = Literal["hills", "plain", "airfield", "follow", "forest", "walled-forest", "course", "car-park"]
 VEHICLES_MAX = 50
+SEED_MAX = 2**31 - 1
 ITEM_MARK = "item "  # of a mission: the moment is when it is reached
 
 
@@ -164,6 +165,8 @@ class Vehicle(Part):
         orders = [name for name in ("plan", "script", "python") if getattr(self, name)]
         if len(orders) > 1:
             raise ValueError(f"{' and '.join(orders)}: choose one, a plan, a script or Python")
+        if self.count > 1 and "ne_m" in self.start.model_fields_set:
+            raise KeyRefusal(("start", "ne_m"), f"is one place for {self.count} vehicles: write each in vehicles")
         return self
 
 
@@ -179,11 +182,11 @@ class Scenario(Part):
     """One scenario."""
 
     _source: Source = PrivateAttr(default_factory=Source)
-    name: str = ""
+    name: FileName = ""
     """Left out: the file's."""
     about: str = ""
     """What it shows, in a sentence."""
-    seeds: tuple[int, ...] = Field(default=(1,), min_length=1, max_length=10_000)
+    seeds: tuple[Annotated[int, Field(ge=0, le=SEED_MAX)], ...] = Field(default=(1,), min_length=1, max_length=10_000)
     """Of noise, turbulence and the owner's path; it is flown once with each."""
     time_max_s: float = Field(default=600.0, gt=0.0, le=36_000.0)
     """Simulated; a script that is not done by then has failed."""

@@ -33,18 +33,19 @@ def find_files(paths: Iterable[Path]) -> list[Path]:
     Raises:
         UserError: there is no such path, or a folder without any.
     """
-    found: dict[Path, None] = {}
+    found: dict[Path, Path] = {}  # as it is named, by where it is
     for path in paths:
         if path.is_dir():
             inside = sorted(path.rglob(f"*{SUFFIX}"))
             if not inside:
                 raise UserError(f"{path}: holds no *{SUFFIX}")
-            found.update(dict.fromkeys(inside))
         elif path.is_file():
-            found[path] = None
+            inside = [path]
         else:
             raise UserError(f"{path}: no such file or folder")
-    return list(found)
+        for each in inside:
+            found.setdefault(each.resolve(), each)
+    return list(found.values())
 
 
 def read_scenario(path: Path | str) -> Scenario:

@@ -97,7 +97,8 @@ def _value(schema: dict[str, Any]) -> str:
             return f"{len(schema['prefixItems'])} numbers"
         return f"list of {_value(schema['items'])}"
     if "$ref" in (schema.get("additionalProperties") or {}):
-        return f"{_value(schema['additionalProperties'])} by key"
+        names = schema.get("propertyNames", {}).get("enum", ())
+        return f"{_value(schema['additionalProperties'])} by key{': ' if names else ''}{', '.join(names)}"
     if schema.get("type") == "object":
         return "bounds by name" if "propertyNames" in schema else "numbers by name"
     return _TYPES.get(schema.get("type", ""), "") + _bounds(schema)

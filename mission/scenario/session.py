@@ -1,10 +1,6 @@
 """`honeyguide test`: flies scenarios side by side in processes, shows their results and writes them."""
 
-import multiprocessing
-import shutil
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 
@@ -14,73 +10,34 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from common.files import write_whole
-from common.pool_worker import end_with_parent
+from common.worker_processes import WorkerProcesses
 from mission.console.option_checks import UserError
 from mission.console.terminal import print_line
 from mission.scenario.junit import junit_text
-from mission.scenario.keeping import keep_scenario, run_folder_of
+from mission.scenario.one_run import Flown, Planned, ScenarioRuns, failure_lines
 from mission.scenario.result import CheckResult, ScenarioResult
-from mission.scenario.runner import run_scenario
 from mission.scenario.scenario import Scenario
 
 WIDTH = 150  # of the table where there is no terminal
 
 
-@dataclass(frozen=True, slots=True)
-class Planned:
-    """One run of one scenario."""
-
-    scenario: Scenario
-    file: str
-    seed: int
-    keep: Path | None
-    """Folder for the runs that fail."""
-    keeps_all: bool = False
-    """And for those that pass."""
-    has_mcap: bool = False
-    """Those that are kept have an MCAP file beside each log."""
-
-
-@dataclass(frozen=True, slots=True)
-class Flown:
-    """What came of it."""
-
-    result: ScenarioResult | None
-    refusal: str = ""
-    """Why it could not be flown at all."""
-    command: str = ""
-    """That flies a kept run again."""
-
-
-def fly(planned: Planned) -> Flown:
-    """One run, in a process of its own or here."""
-    try:
-        folder = None if planned.keep is None else run_folder_of(planned.keep, planned.scenario, planned.seed)
-        result = run_scenario(planned.scenario, planned.seed, folder=folder, file=planned.file)
-    except UserError as error:
-        return Flown(None, planned.scenario.refusal(error, planned.file))
-    if folder is None:
-        return Flown(result)
-    if result.passed and not planned.keeps_all:
-        shutil.rmtree(folder)
-        return Flown(replace(result, folder="", ulogs=(), tlogs=()))
-    if planned.has_mcap:
-        from mission.foxglove.convert import convert
-
-        for ulog in map(Path, result.ulogs):
-            convert(ulog, ulog.with_suffix(".mcap"))
-    return Flown(result, command=keep_scenario(folder, planned.scenario, planned.seed))
-
-
 def scenario_session(
-    planned: Sequence[Planned], jobs: int, *, junit: Path | None = None, is_quiet: bool = False
+    planned: Sequence[Planned], jobs: int, run_max_s: float, *, junit: Path | None = None, is_quiet: bool = False
 ) -> int:
-    """Flies all, shows and writes the results; the exit code: 0 all passed, 1 some failed, 2 one cannot be flown."""
+    """Flies all, shows and writes the results; the exit code: 0 all passed, 1 some failed, 2 one cannot be flown.
+
+    Args:
+        planned: each run once.
+        jobs: how many processes at a time.
+        run_max_s: a run that takes longer by the wall clock hangs, and is given up.
+        junit: written as JUnit XML.
+        is_quiet: without the table.
+    """
     console = Console()
     if not console.is_terminal:
         console = Console(width=WIDTH)
     try:
-        flown = _flown(planned, min(jobs, len(planned)), console)
+        flown = _flown(planned, jobs, run_max_s, console)
     except KeyboardInterrupt:
         print_line(console, "stopped by the user")
         return 1
@@ -90,7 +47,11 @@ def scenario_session(
         console.print(_table(results))
     _tell(flown, console)
     if junit is not None:
-        write_whole(junit, junit_text(results))
+        try:
+            every = [each.result or run.refused(each.refusal) for run, each in zip(planned, flown, strict=True)]
+            write_whole(junit, junit_text(every))
+        except OSError as error:
+            raise UserError(f"--junit {junit}: cannot be written: {error.strerror}") from error
         print_line(console, f"JUnit: {junit}")
     for refusal in refusals:
         print_line(console, f"cannot be flown: {refusal}")
@@ -99,37 +60,24 @@ def scenario_session(
     return 0 if all(result.passed for result in results) else 1
 
 
-def _flown(planned: Sequence[Planned], jobs: int, console: Console) -> list[Flown]:
+def _flown(planned: Sequence[Planned], jobs: int, run_max_s: float, console: Console) -> list[Flown]:
     """In the order in which they were planned."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    done: dict[int, Flown] = {}
-    with Progress(*columns, console=console, transient=True) as progress:
-        bar = progress.add_task("scenarios", total=len(planned))
-
-        def note(index: int, flown: Flown) -> None:
-            done[index] = flown
-            progress.advance(bar)
-            is_passed = flown.result is not None and flown.result.passed
-            if not is_passed or not console.is_terminal:
-                text = (
-                    f"{planned[index].scenario.name}, seed {planned[index].seed}: {'passed' if is_passed else 'failed'}"
-                )
-                print_line(progress.console, f"{len(done)}/{len(planned)} {text}")
-
-        if jobs <= 1:
-            for index, each in enumerate(planned):
-                note(index, fly(each))
-        else:
-            with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), end_with_parent) as pool:
-                order = sorted(range(len(planned)), key=lambda index: -_weight(planned[index].scenario))
-                futures = {pool.submit(fly, planned[index]): index for index in order}
-                try:
-                    for future in as_completed(futures):
-                        note(futures[future], future.result())
-                except KeyboardInterrupt:
-                    pool.shutdown(wait=False, cancel_futures=True)
-                    raise
-    return [done[index] for index in range(len(planned))]
+    done: dict[tuple[str, int], Flown] = {}
+    processes = WorkerProcesses[Planned, Flown](ScenarioRuns(), jobs, run_max_s)
+    try:
+        with Progress(*columns, console=console, transient=True) as progress:
+            bar = progress.add_task("scenarios", total=len(planned))
+            for each, flown in processes.done(sorted(planned, key=lambda each: -_weight(each.scenario))):
+                done[each.key] = flown
+                progress.advance(bar)
+                is_passed = flown.result is not None and flown.result.passed
+                if not is_passed or not console.is_terminal:
+                    text = f"{each.scenario.name}, seed {each.seed}: {'passed' if is_passed else 'failed'}"
+                    print_line(progress.console, f"{len(done)}/{len(planned)} {text}")
+    finally:
+        processes.close()
+    return [done[each.key] for each in planned]
 
 
 def _weight(scenario: Scenario) -> int:
@@ -167,21 +115,13 @@ def _row(check: CheckResult) -> tuple[str, ...]:
 
 
 def _tell(flown: Sequence[Flown], console: Console) -> None:
-    """What failed, how it is flown again, and the sum."""
+    """What failed, how it is flown again, what could not be kept, and the sum."""
     results = [each.result for each in flown if each.result is not None]
     for each in flown:
         if each.result is not None and not each.result.passed:
             for line in failure_lines(each):
                 print_line(console, line)
+        if each.note:
+            print_line(console, each.note)
     passed, simulated_s = sum(result.passed for result in results), sum(result.simulated_s for result in results)
     print_line(console, f"{passed} of {len(flown)} passed, {simulated_s:.0f} simulated seconds")
-
-
-def failure_lines(flown: Flown) -> list[str]:
-    """What failed of a run, and how it is flown again."""
-    result = flown.result
-    if result is None:
-        return [flown.refusal]
-    kept = [f"  kept in {result.folder}; again: {flown.command}"] if flown.command else []
-    done = [f"  {time_s:.1f} s {text}" for time_s, _, text in result.events]
-    return [f"{result.name}, seed {result.seed}:", *(f"  {text}" for text in result.failures), *done, *kept]

@@ -8,17 +8,18 @@ lockstep flight on simulated time, and then the same flight gives the same bytes
 
 from collections import deque
 from collections.abc import Callable
-from math import isfinite
+from math import isfinite, nan
 
 import numpy as np
 
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.client_end import ByteLink
+from policies.companion.aftermath import Aftermath, Condition
 from policies.companion.decision_log import Decision, OnDecision, motion_along_nose, motion_of
 from policies.companion.engagement import Engagement, Phase, Sending, Situation, Wish
 from policies.companion.skills.skill import Floats, Skill, Velocity
 from policies.companion.stick_control import StickControl
-from policies.companion.vehicle_link import NEVER_US, VehicleLink
+from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
 
 SETPOINT_US = 50_000
 TELEMETRY_OLD_US = 500_000
@@ -55,7 +56,10 @@ class Companion:
         self._sticks = StickControl(self.vehicle) if is_by_sticks else None
         self.skill = skill
         skill.attach(self.vehicle)
-        self.engagement = Engagement(is_reported=is_reported, ready=skill.ready, flying=skill.flying)
+        aftermath = Aftermath(skill.return_s, skill.resume_s)
+        self.engagement = Engagement(
+            is_reported=is_reported, ready=skill.ready, flying=skill.flying, aftermath=aftermath
+        )
         self.latencies_s: deque[float] = deque(maxlen=LATENCIES_KEPT)  # image or scan in to setpoint out
         self.decision_count = 0
         self.trouble = ""  # why it does not fly
@@ -69,6 +73,8 @@ class Companion:
         self._setpoint_due_us = 0
         self._is_sent_in_guided = False  # ArduPilot's own goto is flown in the mode that setpoints are flown in
         self._sending = Sending.NOTHING
+        self._begun_us = NEVER_US  # when the policy took over
+        self._healthy_then: int | None = None  # what worked then
 
     def frame(self, time_us: int) -> None:
         """One step of the loop.
@@ -87,15 +93,16 @@ class Companion:
             self.engagement.engage()
             self._is_sent_in_guided = vehicle.own.mode is Mode.GUIDED
         blindness = self._blindness(time_us)
-        self.trouble = blindness or skill.loss(vehicle.own) or (NO_DECISION if self._is_undecided else "")
-        orders = self.engagement.step(self._situation(time_us))
+        loss = skill.loss(vehicle.own)
+        self.trouble = blindness or loss or (NO_DECISION if self._is_undecided else "")
+        orders = self.engagement.step(self._situation(time_us, is_lost=bool(loss) and not blindness))
         if orders.text:
             vehicle.say(orders.text)
         if orders.wish is Wish.HOLD and self._sticks is not None:
             self._sticks.hold(time_us)
         elif orders.wish is not Wish.NONE:
             vehicle.ask_for(orders.wish)
-        self._switch(orders.sending)
+        self._switch(orders.sending, time_us)
         has_decided = has_sensed and not blindness and self._decide(time_us) and orders.sending is Sending.POLICY
         is_sending = orders.sending is not Sending.NOTHING or self._sticks is not None
         if is_sending and (has_decided or time_us >= self._setpoint_due_us):
@@ -123,10 +130,11 @@ class Companion:
         else:
             self.vehicle.send_setpoint(*self._setpoint, is_along_nose=self.skill.is_along_nose)
 
-    def _switch(self, sending: Sending) -> None:
+    def _switch(self, sending: Sending, time_us: int) -> None:
         """Takes over, or lets go."""
         if sending is Sending.POLICY and self._sending is not Sending.POLICY:
             self.skill.begin(self.vehicle.own)
+            self._begun_us, self._healthy_then = time_us, self.vehicle.own.health
         self._sending = sending
         if sending is not Sending.POLICY:
             self._setpoint = STILL
@@ -172,7 +180,7 @@ class Companion:
             image=skill.recorded_image(),
         )
 
-    def _situation(self, time_us: int) -> Situation:
+    def _situation(self, time_us: int, *, is_lost: bool) -> Situation:
         own = self.vehicle.own
         return Situation(
             time_us=time_us,
@@ -182,7 +190,31 @@ class Companion:
             mode_name=own.mode_name,
             trouble=self.trouble,
             is_refused=self.vehicle.take_refusal(),
+            condition=self._condition(time_us, is_lost=is_lost),
         )
+
+    def _condition(self, time_us: int, *, is_lost: bool) -> Condition:
+        own, skill = self.vehicle.own, self.skill
+        has_attitude = time_us - own.attitude_us <= TELEMETRY_OLD_US
+        return Condition(
+            mode=own.mode,
+            is_failsafe=own.is_failsafe,
+            is_heard=time_us - own.heartbeat_us <= HEARTBEAT_OLD_US < time_us - self.vehicle.other_us,
+            is_down=not own.is_armed or (own.is_on_ground and not own.is_landing),
+            is_unplaced=has_attitude and time_us - own.position_us > TELEMETRY_OLD_US,
+            is_well=has_attitude and self._is_well(own),
+            is_lost=is_lost,
+            is_alone=skill.is_alone(own),
+            is_covered=self._sending is not Sending.POLICY and skill.is_covered(own),
+            height_m=own.range_m if time_us - own.range_us <= TELEMETRY_OLD_US else nan,
+            pos_ned=own.pos_ned,
+        )
+
+    def _is_well(self, own: Own) -> bool:
+        """Whether all works that did when the policy took over, and no emergency was announced since."""
+        if self._healthy_then is None or own.health is None or own.is_battery_low:
+            return False
+        return not self._healthy_then & ~own.health and own.alarm_us < self._begun_us
 
     def _blindness(self, time_us: int) -> str:
         """Why there is nothing to decide on; "" if there is."""

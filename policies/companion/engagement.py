@@ -2,15 +2,20 @@
 
 In: the situation, at every step of the companion's loop. Out: which setpoints to send, which mode to ask for, what to
 tell the pilot. It knows no sockets, no messages and no clock but the one in the situation. The pilot comes first: the
-companion never takes back what has been taken from it, and flies again only when it is told again.
+companion never takes back what has been taken from it, and flies again only when it is told again. What it may do by
+itself where no pilot has taken anything is in aftermath.py.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
+
+from autopilot.interface.vehicle_state import Mode
+from policies.companion.aftermath import Aftermath, Condition, Due, Right
 
 ASK_AGAIN_US = 500_000  # a mode that has not come is asked for again
 ENGAGE_PATIENCE_US = 3_000_000  # after which a change to Offboard that has not come has failed
 HAND_BACK_PATIENCE_US = 3_000_000  # after which the vehicle is left to its own loss-of-offboard failsafe
+RETURN_PATIENCE_US = 3_000_000  # after which it stays in Hold
 SILENCE_US = 2_000_000  # after control has gone, before setpoints that ask for nothing are offered again
 
 
@@ -25,6 +30,8 @@ class Phase(Enum):
     FLYING = "flying"  # the policy's setpoints are flown
     HANDING_BACK = "handing back"  # stays where it is, and asks for Hold
     RELEASED = "released"  # control has gone to somebody else; sends nothing
+    REGAINING = "regaining"  # there is a position again: asks for Hold, and waits there until it may go on
+    RETURNING = "returning"  # nobody is there to be followed, and asks for Return
 
 
 class Sending(Enum):
@@ -41,6 +48,7 @@ class Wish(Enum):
     NONE = 0
     OFFBOARD = 1
     HOLD = 2
+    RETURN = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +61,8 @@ class Situation:
     is_holding: bool  # in mode Hold: waiting for whatever comes next
     mode_name: str = ""  # for the pilot to read
     trouble: str = ""  # why the policy cannot fly now; "" if it can
-    is_refused: bool = False  # the vehicle has refused Offboard since the last step
+    is_refused: bool = False  # the vehicle has refused a mode since the last step
+    condition: Condition = field(default_factory=Condition)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +81,21 @@ class Engagement:
         is_told: to engage as soon as everything is there and the vehicle holds in the air; once.
         ready: what it could do, for the pilot to read.
         flying: what it does.
+        aftermath: what it may do by itself; None: nothing.
     """
 
-    def __init__(self, *, is_reported: bool = False, ready: str = "ready to follow", flying: str = "following") -> None:
+    def __init__(
+        self,
+        *,
+        is_reported: bool = False,
+        ready: str = "ready to follow",
+        flying: str = "following",
+        aftermath: Aftermath | None = None,
+    ) -> None:
         self._ready_text, self._flying_text = f"Companion: {ready}", f"Companion: {flying}"
         self.phase = Phase.WAITING
+        self._aftermath = aftermath or Aftermath(0.0, 0.0)
+        self._before = Condition()  # when it began to hand back
         self._is_reported = is_reported
         self._since_us = 0  # when this phase began
         self._asked_us = 0  # when a mode was last asked for
@@ -92,6 +111,13 @@ class Engagement:
         """Takes the next step; at most one change of phase."""
         is_chosen = now.is_offboard and not self._was_offboard  # the pilot has just switched to Offboard
         self._was_offboard = now.is_offboard
+        text = self._aftermath.look(now.time_us, now.condition)
+        if text:
+            return Orders(text=text)
+        if self.phase in (Phase.WAITING, Phase.READY, Phase.RELEASED) and not now.is_offboard:
+            orders = self._after(now)
+            if orders is not None:
+                return orders
         match self.phase:
             case Phase.WAITING:
                 return self._waiting(now, is_chosen)
@@ -105,6 +131,26 @@ class Engagement:
                 return self._handing_back(now)
             case Phase.RELEASED:
                 return self._released(now, is_chosen)
+            case Phase.REGAINING:
+                return self._regaining(now, is_chosen)
+            case Phase.RETURNING:
+                return self._returning(now, is_chosen)
+
+    def _after(self, now: Situation) -> Orders | None:
+        """What it does by itself, though nobody has told it; None: nothing."""
+        match self._aftermath.due(now.time_us, now.condition):
+            case Due.CATCH:
+                self._aftermath.catch()
+                return self._ask(Phase.REGAINING, now, Wish.HOLD, "Companion: position is back: hold")
+            case Due.RESUME:
+                return self._go(Phase.REGAINING, now, Sending.STAY, text="Companion: position is back")
+            case Due.RETURN if now.condition.is_covered:
+                self._aftermath.end()
+                return Orders(_offered(now), text="Companion: owner lost, no way up: stays")
+            case Due.RETURN:
+                return self._ask(Phase.RETURNING, now, Wish.RETURN, "Companion: owner lost, returning")
+            case Due.NONE:
+                return None
 
     def _waiting(self, now: Situation, is_chosen: bool) -> Orders:
         if now.trouble:
@@ -128,32 +174,30 @@ class Engagement:
             return self._go(Phase.WAITING, now, text=f"Companion: not engaged: {now.trouble}")
         if now.is_offboard:
             return self._fly(now)
+        if not now.is_holding:  # nor is it asked for over a pilot who has just chosen something else
+            return self._go(Phase.READY, now, Sending.STAY, text=f"Companion: not engaged: mode {now.mode_name}")
         if now.is_refused or now.time_us - self._since_us > ENGAGE_PATIENCE_US:
             return self._go(Phase.READY, now, Sending.STAY, text="Companion: not engaged: Offboard was refused")
-        if now.time_us - self._asked_us >= ASK_AGAIN_US:
-            self._asked_us = now.time_us
-            return Orders(Sending.STAY, Wish.OFFBOARD)
-        return Orders(Sending.STAY)
+        return self._repeat(now, Wish.OFFBOARD)
 
     def _flying(self, now: Situation) -> Orders:
         if not now.is_offboard:
-            text = f"Companion: stopped: mode {now.mode_name}"
-            return self._go(Phase.RELEASED, now, text=text)
+            self._aftermath.let_go(now.time_us, now.condition)
+            return self._stop(now)
         if not now.is_airborne:
             return self._go(Phase.RELEASED, now, text="Companion: stopped: not in the air")
         if now.trouble:
+            self._before = now.condition
             return self._ask(Phase.HANDING_BACK, now, Wish.HOLD, f"Companion: hold: {now.trouble}")
         return Orders(Sending.POLICY)
 
     def _handing_back(self, now: Situation) -> Orders:
         if not now.is_offboard:
+            self._aftermath.let_go(now.time_us, now.condition, self._before)
             return self._go(Phase.RELEASED, now)
         if now.time_us - self._since_us > HAND_BACK_PATIENCE_US:
             return self._go(Phase.RELEASED, now, text="Companion: stopped: Hold was not taken")
-        if now.time_us - self._asked_us >= ASK_AGAIN_US:
-            self._asked_us = now.time_us
-            return Orders(Sending.STAY, Wish.HOLD)
-        return Orders(Sending.STAY)
+        return self._repeat(now, Wish.HOLD)
 
     def _released(self, now: Situation, is_chosen: bool) -> Orders:
         if is_chosen and now.is_airborne and not now.trouble:  # the last setpoints were recent enough to be flown on
@@ -162,7 +206,52 @@ class Engagement:
             return self._go(Phase.WAITING, now)
         return Orders()
 
+    def _regaining(self, now: Situation, is_chosen: bool) -> Orders:
+        aftermath, condition = self._aftermath, now.condition
+        if is_chosen and now.is_airborne and not now.trouble:
+            return self._fly(now)
+        if aftermath.right is Right.NONE:
+            return self._stop(now)
+        if aftermath.right is Right.FALLEN:
+            if condition.is_unplaced or not aftermath.is_catching:  # lost again, or another failsafe
+                return self._go(Phase.RELEASED, now)
+            if now.time_us - self._since_us > HAND_BACK_PATIENCE_US:
+                aftermath.end()
+                return self._go(Phase.RELEASED, now, text="Companion: Hold was not taken")
+            return self._repeat(now, Wish.HOLD)
+        if not aftermath.may_resume(now.time_us):
+            why = now.trouble or ("the owner is not seen" if condition.is_alone else "the position is not steady")
+            return self._go(Phase.RELEASED, now, text=f"Companion: stays in hold: {why}")
+        if aftermath.due(now.time_us, condition) is Due.RESUME and now.is_airborne and not now.trouble:
+            aftermath.asked()
+            return self._ask(Phase.ENGAGING, now, Wish.OFFBOARD)
+        return Orders(Sending.STAY)
+
+    def _returning(self, now: Situation, is_chosen: bool) -> Orders:
+        if is_chosen and now.is_airborne and not now.trouble:
+            return self._fly(now)
+        if now.condition.mode is Mode.RETURN:
+            return self._go(Phase.RELEASED, now)
+        if self._aftermath.right is Right.NONE:
+            return self._stop(now)
+        if now.is_refused or now.time_us - self._since_us > RETURN_PATIENCE_US:
+            self._aftermath.end()
+            return self._go(Phase.RELEASED, now, text="Companion: stays in hold: Return was refused")
+        return self._repeat(now, Wish.RETURN)
+
+    def _repeat(self, now: Situation, wish: Wish) -> Orders:
+        """Asks for a mode again if that is due."""
+        if now.time_us - self._asked_us < ASK_AGAIN_US:
+            return Orders(Sending.STAY)
+        self._asked_us = now.time_us
+        return Orders(Sending.STAY, wish)
+
+    def _stop(self, now: Situation) -> Orders:
+        """Somebody else has control."""
+        return self._go(Phase.RELEASED, now, text=f"Companion: stopped: mode {now.mode_name}")
+
     def _fly(self, now: Situation) -> Orders:
+        self._aftermath.end()
         return self._go(Phase.FLYING, now, Sending.POLICY, text=self._flying_text)
 
     def _go(self, phase: Phase, now: Situation, sending: Sending = Sending.NOTHING, text: str = "") -> Orders:

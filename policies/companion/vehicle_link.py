@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import isfinite, isnan, nan
 from typing import Any
 
-from autopilot.interface.vehicle_state import LandedState, Mode, Severity
+from autopilot.interface.vehicle_state import BatteryLevel, LandedState, Mode, Severity
 from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT, ByteLink, ClientEnd, frame_of
 from autopilot.mavlink.dialects import Dialect, UnknownModeError
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
@@ -39,10 +39,13 @@ RATES_HZ = {
     "DISTANCE_SENSOR": 50.0,
     "EXTENDED_SYS_STATE": 5.0,
     "GPS_GLOBAL_ORIGIN": 1.0,
+    "SYS_STATUS": 5.0,
+    "BATTERY_STATUS": 1.0,
 }
 _COMMAND_SET_MODE, _COMMAND_SET_INTERVAL = 176, 511
 _CUSTOM_MODE = 1.0  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _GROUND_VEHICLES = (10, 11)  # MAV_TYPE: rover, boat
+_FAILSAFE = (5, 6)  # MAV_STATE: critical, emergency
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _LOCAL_NED, _BODY_NED = 1, 8  # MAV_FRAME
 _VELOCITY_AND_YAW_RATE = 0b0101_1100_0111  # type_mask: position, acceleration and yaw are free
@@ -51,8 +54,9 @@ _HAS_POSITION, _HAS_VELOCITY = 1, 2  # FOLLOW_TARGET.est_capabilities
 _LOOKS_DOWN = 25  # MAV_SENSOR_ROTATION_PITCH_270
 _IDS = {
     name: message_id(name)
-    for name in (*RATES_HZ, "HEARTBEAT", "FOLLOW_TARGET", "COMMAND_ACK")
+    for name in (*RATES_HZ, "HEARTBEAT", "FOLLOW_TARGET", "COMMAND_ACK", "STATUSTEXT")
 }  # fmt: skip
+_STATUS = frozenset({"EXTENDED_SYS_STATE", "SYS_STATUS", "BATTERY_STATUS", "STATUSTEXT"})
 _NAMES = {msg_id: name for name, msg_id in _IDS.items()}
 _DIALECTS: dict[int, Dialect] = {int(PX4.autopilot): PX4, int(ARDUPILOT.autopilot): ARDUPILOT}
 _GROUND_DIALECTS: dict[int, Dialect] = {
@@ -77,6 +81,11 @@ class Own:
     is_ground_vehicle: bool = False
     is_armed: bool = False
     is_on_ground: bool = True  # or just taking off, or landing
+    is_landing: bool = False  # and not on the ground yet
+    is_failsafe: bool = False  # as its heartbeat says
+    health: int | None = None  # MAV_SYS_STATUS_SENSOR of all that works; None: not known
+    is_battery_low: bool = False
+    alarm_us: int = NEVER_US  # when it said last that something is an emergency
     mode: Mode | None = None
     mode_name: str = "unknown"
     origin: GeoPoint | None = None  # of the local frame
@@ -217,7 +226,8 @@ class VehicleLink:
     def ask_for(self, wish: Wish) -> None:
         """Asks the vehicle for a mode."""
         is_px4 = not self.is_ardupilot
-        mode = self._hold_mode if wish is Wish.HOLD else self._flown_mode
+        modes = {Wish.HOLD: self._hold_mode, Wish.RETURN: Mode.RETURN}
+        mode = modes.get(wish, self._flown_mode)
         self._asked_for = mode
         number = self._dialect.custom_mode(mode)
         if is_px4:
@@ -249,8 +259,8 @@ class VehicleLink:
             self._distance_reported(fields, time_us)
         elif name == "HEARTBEAT":
             self._heartbeat_reported(fields, time_us)
-        elif name == "EXTENDED_SYS_STATE":
-            own.is_on_ground = fields.landed_state != LandedState.IN_AIR
+        elif name in _STATUS:
+            self._status_reported(name, fields, time_us)
         elif name == "GPS_GLOBAL_ORIGIN":
             own.origin = GeoPoint(
                 degrees_from_e7(fields.latitude), degrees_from_e7(fields.longitude), fields.altitude * 1.0e-3
@@ -270,6 +280,18 @@ class VehicleLink:
             own.q_ned_from_frd, own.omega_frd = quat_from_wxyz(wxyz), omega_frd
             own.boot_us, own.attitude_us = self.clock.time_us(fields.time_boot_ms), time_us
 
+    def _status_reported(self, name: str, fields: Any, time_us: int) -> None:
+        own = self.own
+        if name == "EXTENDED_SYS_STATE":
+            own.is_on_ground = fields.landed_state != LandedState.IN_AIR
+            own.is_landing = fields.landed_state == LandedState.LANDING
+        elif name == "SYS_STATUS":
+            own.health = fields.onboard_control_sensors_health
+        elif name == "BATTERY_STATUS":
+            own.is_battery_low = fields.charge_state > BatteryLevel.OK
+        elif fields.severity <= Severity.ALERT:
+            own.alarm_us = time_us
+
     def _distance_reported(self, fields: Any, time_us: int) -> None:
         if fields.orientation != _LOOKS_DOWN:
             return
@@ -284,6 +306,7 @@ class VehicleLink:
         dialects = _GROUND_DIALECTS if own.is_ground_vehicle else _DIALECTS
         self._dialect = dialects.get(fields.autopilot, dialects[int(PX4.autopilot)])
         own.is_armed = bool(fields.base_mode & _ARMED)
+        own.is_failsafe = fields.system_status in _FAILSAFE
         try:
             self._enter(self._dialect.mode_from_custom(fields.custom_mode))
         except UnknownModeError:

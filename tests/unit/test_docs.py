@@ -57,7 +57,7 @@ RUN_BY_OTHERS = (
     f"{HONEYGUIDE} campaign ",  # tests/system/campaigns
     f"{HONEYGUIDE} dataset ",  # tests/system/companion/test_recorded_flight.py, tests/unit/mission/dataset
     f"{HONEYGUIDE} companion ",  # tests/system/companion/test_companion.py
-    *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export")),  # tests/unit/mission/train
+    *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export", "card")),  # tests/unit/mission/train
 )
 
 

@@ -8,7 +8,7 @@ from mission.campaign.campaign import Campaign
 
 STEPS = ("arm", "takeoff", "goto_ned", "hold", "wait", "speed", "mark", "land", "return_home", "wait_disarmed")
 FAULTS = ("wind", "sensor", "motor", "battery")
-LEFT_OUT_CHECKS = ("separation", "following", "interventions", "reached")
+LEFT_OUT_CHECKS = ("separation", "following", "scorecard", "interventions", "figures", "reached")
 SHARED_KEYS = (
     "world",
     "home",

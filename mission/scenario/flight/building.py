@@ -19,13 +19,16 @@ from mission.fleet.fleet_options import Member
 from mission.fleet.roster import fleet_configs
 from mission.flight import Flight
 from mission.flight_config import AIRFIELD, TREELESS_M, FlightConfig, OwnerConfig
+from mission.kernel_loading import load_kernels
 from mission.scenario.flight.checking import (
     airframe_of,
+    check_checks,
     check_faults,
     check_orders,
     check_parameters,
     check_purpose,
     check_starts,
+    check_steps,
 )
 from mission.scenario.parts.part import KeyRefusal
 from mission.scenario.scenario import Scenario, Vehicle, World
@@ -106,6 +109,30 @@ def flight_configs(scenario: Scenario, seed: int) -> list[FlightConfig]:
     Raises:
         KeyRefusal: an airframe, a parameter or the world is wrong.
     """
+    base, own = _own_configs(scenario, seed)
+    return own if len(own) == 1 else _placed(base, scenario, own)
+
+
+def load_scenario_kernels(scenario: Scenario) -> None:
+    """Loads the kernels that a scenario is flown by; those that the cache lacks are compiled, which takes minutes."""
+    if scenario.owner is not None:
+        import mission.follow.onboard_camera
+        import mission.follow.owner_device
+        import mission.scenario.flight.companions  # noqa: F401  (their kernels are loaded with the others)
+    try:
+        _, configs = _own_configs(scenario, scenario.seeds[0])
+    except UserError:
+        return  # who flies it says so
+    for config in {(config.airframe, config.has_lidar): config for config in configs}.values():
+        load_kernels(lambda _: None, config, has_camera=False)
+
+
+def _own_configs(scenario: Scenario, seed: int) -> tuple[FlightConfig, list[FlightConfig]]:
+    """What all vehicles have in common, and the configuration of each, which is not yet in its place.
+
+    Raises:
+        KeyRefusal: an airframe, a parameter or the world is wrong.
+    """
     fleet = scenario.fleet
     home = DEFAULT_HOME if scenario.home is None else GeoPoint(*scenario.home.model_dump().values())
     base = FlightConfig(
@@ -124,7 +151,7 @@ def flight_configs(scenario: Scenario, seed: int) -> list[FlightConfig]:
         airframe = airframe_of(vehicle, key)
         own.append(_own(base, scenario, vehicle, drives=class_of(airframe).drives))
         check_parameters(own[-1], airframe, key)
-    return own if len(own) == 1 else _placed(base, scenario, own)
+    return base, own
 
 
 def check_scenario(scenario: Scenario, file: str, *, is_whole: bool = True) -> None:
@@ -136,13 +163,15 @@ def check_scenario(scenario: Scenario, file: str, *, is_whole: bool = True) -> N
         is_whole: nobody tells the vehicles anything besides.
 
     Raises:
-        UserError: an airframe, parameter, plan, policy or function is not there, a fault is of a part that is not
-            there, or a vehicle starts where it cannot.
+        UserError: an airframe, parameter, plan, policy or function is not there, a step, a fault or a check is of what
+            a vehicle has not, or a vehicle starts where it cannot.
     """
     try:
         configs = flight_configs(scenario, scenario.seeds[0])
         check_orders(scenario)
+        check_steps(scenario, configs)
         check_faults(scenario, configs)
+        check_checks(scenario, configs)
         check_starts(scenario, configs)
         if is_whole:
             check_purpose(scenario)
@@ -176,9 +205,7 @@ def _placed(base: FlightConfig, scenario: Scenario, own: list[FlightConfig]) -> 
         raise KeyRefusal(("vehicles",), str(error).removeprefix("--vehicles: ")) from error
     fleet = []
     for config, mine, vehicle in zip(placed, own, scenario.fleet, strict=True):
-        has_place = (
-            vehicle.count == 1 and "start" in vehicle.model_fields_set and "ne_m" in vehicle.start.model_fields_set
-        )
+        has_place = "ne_m" in vehicle.start.model_fields_set
         fleet.append(
             mine.model_copy(
                 update={
@@ -205,6 +232,7 @@ class Built:
 
     def __init__(self, scenario: Scenario, seed: int, folder: Path | None) -> None:
         configs = flight_configs(scenario, seed)
+        check_starts(scenario, configs)
         self.stations = [GroundStation() for _ in configs] if scenario.has_ground_station else []
         links: list[Sequence[Link]] = [(station.vehicle_end,) for station in self.stations] or [()] * len(configs)
         self.companion: Any = None

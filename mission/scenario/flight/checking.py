@@ -19,13 +19,17 @@ from common.params import ParameterError, ParameterTable
 from mission.console.option_checks import UserError
 from mission.flight_config import FlightConfig, flight_parameters
 from mission.plan.plan_file import PlanError, read_plan
+from mission.scenario.parts.conditions import terms_of
 from mission.scenario.parts.faults import SensorName
 from mission.scenario.parts.part import Key, KeyRefusal
+from mission.scenario.parts.steps import Step
 from mission.scenario.scenario import Scenario, Vehicle
 from mission.simulator.flight_rig import flight_world
 from sim.bodies.vehicles import class_of
 from sim.world.custom.world_file import WorldFile
 
+POLICY_STEPS = ("let_policy_fly", "policy_goto", "policy_park")
+POLICY_CHECKS = ("following", "scorecard", "interventions")
 START_GAP_M = 1.0  # between the centres of two vehicles; nearer, they stand in each other
 
 
@@ -54,14 +58,18 @@ def check_parameters(config: FlightConfig, airframe: Airframe, key: Key) -> None
     """
     table = _defaults(config, airframe, key)
     for name, value in config.parameters.items():
-        if name not in table:
-            hint = nearest(name, table.names) or f"the flight controller of {config.airframe} has none of that name"
-            raise KeyRefusal((*key, "parameters", name), f"unknown parameter; {hint}")
+        _check_name(name, table, config, (*key, "parameters", name))
         try:
             table.set_exactly(name, value)
         except ParameterError as error:
             said = str(error).removeprefix(f"parameter {name}: ")
             raise KeyRefusal((*key, "parameters", name), said) from error
+
+
+def _check_name(name: str, table: ParameterTable, config: FlightConfig, key: Key) -> None:
+    if name not in table:
+        hint = nearest(name, table.names) or f"the flight controller of {config.airframe} has none of that name"
+        raise KeyRefusal(key, f"unknown parameter; {hint}")
 
 
 def _defaults(config: FlightConfig, airframe: Airframe, key: Key) -> ParameterTable:
@@ -90,19 +98,88 @@ def check_orders(scenario: Scenario) -> None:
             _check_policy(vehicle, (*key, "policy"))
 
 
+def check_steps(scenario: Scenario, configs: Sequence[FlightConfig]) -> None:
+    """Refuses steps that the vehicles cannot do, unless the script is to fail.
+
+    Args:
+        scenario: whose scripts.
+        configs: of its vehicles.
+
+    Raises:
+        KeyRefusal: of the first such.
+    """
+    described = dict(zip(scenario.fleet_keys, zip(scenario.fleet, configs, strict=True), strict=True))
+    for key, (vehicle, config) in described.items() if not scenario.fails_with else ():
+        for i, step in enumerate(vehicle.script):
+            own = (*key, "script", i, step.name_chosen)
+            _check_step(step, vehicle, config, own)
+            if step.let_policy_fly is not None and scenario.owner is None:
+                raise KeyRefusal(own, "there is nobody to follow; add an owner")
+
+
+def _check_step(step: Step, vehicle: Vehicle, config: FlightConfig, key: Key) -> None:
+    airframe = load_airframe(config.airframe)
+    if step.name_chosen in POLICY_STEPS and vehicle.policy is None:
+        raise KeyRefusal(key, "the vehicle has no policy")
+    if step.takeoff is not None and class_of(airframe).drives:
+        raise KeyRefusal(key, f"{config.airframe} drives, and takes off never")
+    if step.set_param:
+        table = _defaults(config, airframe, key)
+        for name in step.set_param:
+            _check_name(name, table, config, (*key, name))
+    if step.wait_until is not None:
+        _check_condition(step.wait_until.condition, config, key)
+
+
+def check_checks(scenario: Scenario, configs: Sequence[FlightConfig]) -> None:
+    """Refuses what can never be so: checks, and conditions of faults, of what the vehicles have not.
+
+    Args:
+        scenario: whose.
+        configs: of its vehicles.
+
+    Raises:
+        KeyRefusal: of the first such.
+    """
+    for i, check in enumerate(scenario.checks):
+        key = ("checks", i, check.name_chosen)
+        if check.separation is not None and len(configs) < 2:
+            raise KeyRefusal(key, "there is one vehicle")
+        if check.name_chosen in POLICY_CHECKS and not any(vehicle.policy for vehicle in scenario.fleet):
+            raise KeyRefusal(key, "the vehicle has no policy")
+        for config in configs if check.vehicle is None else configs[check.vehicle - 1 : check.vehicle]:
+            if check.airspeed is not None:
+                _check_airspeed(config, key)
+            if check.always is not None or check.once is not None:
+                _check_condition(check.chosen.condition, config, key)
+    for i, fault in enumerate(scenario.faults):
+        if fault.when is not None:
+            _check_condition(fault.when, configs[fault.vehicle - 1], ("faults", i, "when"))
+
+
+def _check_condition(condition: str, config: FlightConfig, key: Key) -> None:
+    if any(term.quantity == "airspeed" for term in terms_of(condition)):
+        _check_airspeed(config, key)
+
+
+def _check_airspeed(config: FlightConfig, key: Key) -> None:
+    if not isinstance(load_airframe(config.airframe), PlaneAirframe):
+        raise KeyRefusal(key, f"{config.airframe} measures no airspeed, which planes do")
+
+
 def check_purpose(scenario: Scenario) -> None:
     """Refuses what would pass whatever happens.
 
     Raises:
         KeyRefusal: nothing is to be flown, and nothing is checked.
     """
-    if not (scenario.checks or scenario.faults or any(_has_order(vehicle) for vehicle in scenario.fleet)):
+    if not (scenario.checks or scenario.faults or any(_has_orders(vehicle) for vehicle in scenario.fleet)):
         raise KeyRefusal(
             scenario.fleet_keys[0], "is told nothing and nothing is checked: give it a script, or add checks"
         )
 
 
-def _has_order(vehicle: Vehicle) -> bool:
+def _has_orders(vehicle: Vehicle) -> bool:
     return bool(vehicle.script or vehicle.plan or vehicle.python or vehicle.policy)
 
 

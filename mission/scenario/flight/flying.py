@@ -10,7 +10,7 @@ from typing import Any
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects.px4 import PX4
 from mission.client import ScriptError
-from mission.plan.plan_file import Plan, read_plan
+from mission.plan.plan_file import Plan, PlanError, read_plan
 from mission.plan.plan_lists import FENCE_LIST
 from mission.scenario.flight.inline_plans import fence_plan_items, path_plan, survey_plan
 from mission.scenario.flight.quantities import hold_now
@@ -122,7 +122,11 @@ async def _mission(vehicle: VehicleRun, plan: Plan, *, waits: bool) -> None:
 
 
 async def _fly_plan(_: Run, vehicle: VehicleRun, step: s.FlyPlan) -> None:
-    await _mission(vehicle, read_plan(step.file), waits=step.waits)
+    try:
+        plan = read_plan(step.file)
+    except PlanError as error:
+        raise ScriptError(str(error)) from error
+    await _mission(vehicle, plan, waits=step.waits)
 
 
 async def _fly_path(_: Run, vehicle: VehicleRun, step: s.FlyPath) -> None:

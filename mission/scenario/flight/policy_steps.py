@@ -40,7 +40,7 @@ async def go(run: Run, vehicle: VehicleRun, step: PolicyGoto) -> None:
     await drone.until(lambda: companion.phase is Phase.FLYING, ENGAGE_S, "the companion's taking over")
     begun_s = run.time_s
     await drone.until(lambda: companion.phase is not Phase.FLYING, step.timeout_s, "the way")
-    run.figures["policy_goto_s"] = run.time_s - begun_s
+    run.measure(policy_goto_s=run.time_s - begun_s)
 
 
 async def park(run: Run, vehicle: VehicleRun, step: PolicyPark) -> None:
@@ -52,9 +52,7 @@ async def park(run: Run, vehicle: VehicleRun, step: PolicyPark) -> None:
         raise ScriptError(f"spot {step.spot} is not free; there are {free}")
     await get_ready(vehicle.drone)
     arrival = await drive(vehicle.drone, flight, run.companion, pose_in(spots[step.spot], is_reverse=step.is_reverse))
-    run.figures |= {
-        "park_distance_m": arrival.distance_m, "park_turn_deg": arrival.turn_deg, "park_s": arrival.seconds,
-    }  # fmt: skip
+    run.measure(park_distance_m=arrival.distance_m, park_turn_deg=arrival.turn_deg, park_s=arrival.seconds)
     if not arrival.is_there:
         raise ScriptError(
             f"it {arrival.outcome} ({arrival.distance_m:.2f} m from the middle){arrival.why and ': '}{arrival.why}"

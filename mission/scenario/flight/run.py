@@ -30,13 +30,17 @@ class Witness:
         self.texts: list[tuple[float, str]] = []  # [s]
         self.reached: list[tuple[float, int]] = []
         self.touches: list[tuple[float, float, bool]] = []  # [s], [m/s], whether it was the ground
+        self.changes: list[float] = []  # when the guard over its policy changed a decision [s]
+        self.skill: Any = None  # of its policy, if it has one
         rows = flight.rig.rows
         self._truth, self._body = rows["truth"], rows["body"]
         self._truth_row, self._impact = rows["truth"][0], rows["truth"]["impact_speed"]
         flight.controller.attach(self)
 
     def look(self) -> None:
-        """Notes the hardest touch of the frame, and forgets it; after each frame."""
+        """Notes the hardest touch of the frame, and forgets it, and what the guard did; after each frame."""
+        if self.skill is not None and self.skill.interventions is not None:
+            self.changes += [self._now_s()] * (self.skill.interventions.total() - len(self.changes))
         impact = self._impact[0]
         if impact > 0.0:
             truth = self._truth_row
@@ -106,8 +110,14 @@ class Run:
     """What judges how the policy follows, once it does."""
     figures: dict[str, float] = field(default_factory=dict)
     """Measured on the way, for the result."""
+    measured_s: dict[str, float] = field(default_factory=dict)
+    """When each of them was: simulated time [s]."""
     events: list[tuple[float, int, str]] = field(default_factory=list)
     """What the scenario did, faults and marks: simulated time [s], number of the vehicle (0: of all), in words."""
+
+    def __post_init__(self) -> None:
+        if self.companion is not None:
+            self.vehicles[0].witness.skill = self.companion.skill
 
     @property
     def drones(self) -> list[Drone]:
@@ -127,6 +137,11 @@ class Run:
         if name not in self.marks:
             self.marks[name] = self.time_s
             self.note(f"mark: {name}")
+
+    def measure(self, **figures: float) -> None:
+        """Keeps figures of this moment; of a name the last counts."""
+        self.figures |= figures
+        self.measured_s |= dict.fromkeys(figures, self.time_s)
 
     def note(self, text: str, vehicle: int = 0) -> None:
         """Something that the scenario did now."""

@@ -1,6 +1,7 @@
 """Checks of what happens: time, modes, texts, charge, the end, conditions, touches, and how a policy does."""
 
 from math import isfinite, isinf, nan
+from typing import Any
 
 import numpy as np
 
@@ -11,12 +12,17 @@ from mission.scenario.parts import checks as c
 from mission.scenario.parts.conditions import QUANTITIES, Term, terms_of
 from mission.scenario.result import CheckResult
 
+BUSY_S = 10.0  # within which the most interventions are looked for
+
 
 def duration(seen: Seen, check: c.Check, asked: c.Duration) -> Judged:
     """How long it takes."""
     start_s, end_s = seen.ends(check)
     took = np.array([min(end_s, seen.end_s) - start_s])
     at = np.array([min(end_s, seen.end_s)])
+    if check.during is not None:  # however often it was in that mode
+        frames = seen.frames(check)
+        took, at = np.diff(seen.time_s, prepend=0.0)[frames].sum(keepdims=True), seen.time_s[frames][-1:]
     if asked.min_s is not None:
         yield least("least", took, at, asked.min_s, "s", what="duration")
     if asked.max_s is not None:
@@ -44,9 +50,8 @@ def modes(seen: Seen, check: c.Check, asked: c.Modes) -> Judged:
 
 
 def _texts(seen: Seen, check: c.Check, text: str) -> list[tuple[float, str]]:
-    start_s, end_s = seen.ends(check)
-    said = seen.vehicle.witness.texts
-    return [(at, each) for at, each in said if start_s <= at <= end_s and text.lower() in each.lower()]
+    said = seen.happened(check, seen.vehicle.witness.texts)
+    return [(at, each) for at, each in said if text.lower() in each.lower()]
 
 
 def heard(seen: Seen, check: c.Check, asked: c.Heard) -> Judged:
@@ -115,8 +120,7 @@ def _yes(name: str, *, is_it: bool) -> str:
 
 def reached(seen: Seen, check: c.Check, asked: c.Reached) -> Judged:
     """Which items of its mission it reached."""
-    start_s, end_s = seen.ends(check)
-    found = [at for at, seq in seen.vehicle.witness.reached if seq == asked.item and start_s <= at <= end_s]
+    found = [at for at, seq in seen.happened(check, seen.vehicle.witness.reached) if seq == asked.item]
     others = ", ".join(str(seq) for _, seq in seen.vehicle.witness.reached) or "none"
     happened = f"at {found[0]:.1f} s" if found else f"never; reached: {others}"
     yield CheckResult(
@@ -163,21 +167,19 @@ def once(seen: Seen, check: c.Check, asked: c.Once) -> Judged:
 
 def no_contact(seen: Seen, check: c.Check, asked: c.NoContact) -> Judged:
     """What it touched."""
-    start_s, end_s = seen.ends(check)
-    touches = [(at, speed) for at, speed, is_ground in seen.vehicle.witness.touches
-               if not is_ground and start_s <= at <= end_s]  # fmt: skip
+    happened = seen.happened(check, seen.vehicle.witness.touches)
+    touches = [(at, speed) for at, speed, is_ground in happened if not is_ground]
     at, speed = max(touches, key=lambda touch: touch[1], default=(nan, 0.0))
-    happened = f"{speed:.2g} m/s at {at:.1f} s" if touches else "none"
+    shown = f"{speed:.2g} m/s at {at:.1f} s" if touches else "none"
     asked_text = f"touches at most {asked.max_m_s:g} m/s hard" if asked.max_m_s > 0.0 else "touches nothing"
     margin = asked.max_m_s - speed
-    yield CheckResult("contact", margin >= 0.0, asked_text, happened, margin, "m/s", at)
+    yield CheckResult("contact", margin >= 0.0, asked_text, shown, margin, "m/s", at)
 
 
 def touch_down(seen: Seen, check: c.Check, asked: c.TouchDown) -> Judged:
     """How hard it touched the ground."""
-    start_s, end_s = seen.ends(check)
-    touches = [(at, speed) for at, speed, is_ground in seen.vehicle.witness.touches
-               if is_ground and max(start_s, seen.first_flown_s) <= at <= end_s]  # fmt: skip
+    happened = seen.happened(check, seen.vehicle.witness.touches)
+    touches = [(at, speed) for at, speed, is_ground in happened if is_ground and at >= seen.first_flown_s]
     if not touches:
         never = isinf(seen.first_flown_s)
         raise NothingToJudge("it never flew" if never else "it never touched the ground after it flew")
@@ -190,21 +192,24 @@ def following(seen: Seen, check: c.Check, asked: c.Following) -> Judged:
     del check
     from mission.scenario.judging.policy_figures import following_figures
 
-    track = None if seen.run.watch is None else seen.run.watch.track()
-    if track is None:
-        raise NothingToJudge("no policy followed")
-    yield from following_figures(track, asked)
+    yield from following_figures(*_followed(seen), asked)
 
 
-def scorecard(seen: Seen, check: c.Check, asked: dict[str, c.Range]) -> Judged:
+def scorecard(seen: Seen, check: c.Check, asked: dict[c.FigureName, c.Range]) -> Judged:
     """Figures of the scorecard."""
     del check
     from mission.scenario.judging.policy_figures import scorecard_figures
 
-    track = None if seen.run.watch is None else seen.run.watch.track()
+    yield from scorecard_figures(*_followed(seen), asked)
+
+
+def _followed(seen: Seen) -> tuple[Any, Rows]:
+    """The track, and the simulated time of each of its samples."""
+    watch = seen.run.watch
+    track = None if watch is None else watch.track()
     if track is None:
         raise NothingToJudge("no policy followed")
-    yield from scorecard_figures(track, asked)
+    return track, watch.sampled_s
 
 
 def interventions(seen: Seen, _: c.Check, asked: c.Interventions) -> Judged:
@@ -212,7 +217,40 @@ def interventions(seen: Seen, _: c.Check, asked: c.Interventions) -> Judged:
     companion = seen.run.companion
     if companion is None:
         raise NothingToJudge("no policy flew")
-    per_min = 60.0 * sum((companion.skill.interventions or {}).values()) / max(seen.end_s, 1.0)
+    time_s = np.array(seen.vehicle.witness.changes)
+    per_min = 60.0 * len(time_s) / max(seen.end_s, 1.0)
     margin = asked.max_per_min - per_min
-    yield CheckResult("interventions", margin >= 0.0, f"at most {asked.max_per_min:g} per minute", f"{per_min:.3g}",
-                      margin, "/min")  # fmt: skip
+    worst_s = busiest_s(time_s)
+    happened = f"{per_min:.3g}" + (f", most by {worst_s:.1f} s" if len(time_s) else "")
+    yield CheckResult("interventions", margin >= 0.0, f"at most {asked.max_per_min:g} per minute", happened,
+                      margin, "/min", worst_s)  # fmt: skip
+
+
+def busiest_s(time_s: Rows) -> float:
+    """When the most of some moments, in order, had come within ten seconds; NaN: there are none."""
+    if not len(time_s):
+        return nan
+    just_before = np.arange(len(time_s)) - np.searchsorted(time_s, time_s - BUSY_S)
+    return float(time_s[int(np.argmax(just_before))])
+
+
+MEASURED = {
+    "park_distance_m": ("park distance", "m"),
+    "park_turn_deg": ("park turn", "deg"),
+    "park_s": ("park time", "s"),
+    "policy_goto_s": ("goto time", "s"),
+}
+
+
+def figures(seen: Seen, _: c.Check, asked: dict[c.MeasuredName, c.Range]) -> Judged:
+    """What its policy's steps have measured."""
+    run = seen.run
+    for name, bounds in asked.items():
+        title, unit = MEASURED[name]
+        if name not in run.figures:
+            raise NothingToJudge(f"{name} was never measured")
+        value, at = np.array([run.figures[name]]), np.array([run.measured_s[name]])
+        if bounds.min is not None:
+            yield least(title, value, at, bounds.min, unit)
+        if bounds.max is not None:
+            yield most(title, value, at, bounds.max, unit)

@@ -26,7 +26,7 @@ def judge(run: Run, histories: Sequence[History], end_s: float) -> tuple[CheckRe
     found: list[CheckResult] = []
     for check in run.scenario.checks:
         is_of_all = check.name_chosen == "separation"
-        looked = flown[:1] if is_of_all else [flown[check.vehicle - 1]] if check.vehicle is not None else flown
+        looked = [flown[(check.vehicle or 1) - 1]] if is_of_all or check.vehicle is not None else flown
         for seen in looked:
             who = f"vehicle {seen.vehicle.number}: " if len(flown) > 1 and not is_of_all else ""
             found += [replace(result, name=f"{who}{result.name}") for result in _results(seen, check)]
@@ -44,9 +44,12 @@ def _results(seen: Seen, check: c.Check) -> list[CheckResult]:
 
 
 def _said(check: c.Check) -> str:
-    chosen = check.chosen
-    given = chosen if isinstance(chosen, dict) else chosen.model_dump(exclude_none=True)
-    return ", ".join(f"{key} {value}" for key, value in given.items())
+    given = check.model_dump(include={check.name_chosen}, exclude_none=True)[check.name_chosen]
+    return ", ".join(f"{key} {_words(value)}" for key, value in given.items())
+
+
+def _words(value: Any) -> str:
+    return " ".join(f"{key} {each:g}" for key, each in value.items()) if isinstance(value, dict) else str(value)
 
 
 JUDGES: dict[str, Judge] = {
@@ -75,4 +78,5 @@ JUDGES: dict[str, Judge] = {
     "following": event_checks.following,
     "scorecard": event_checks.scorecard,
     "interventions": event_checks.interventions,
+    "figures": event_checks.figures,
 }

@@ -1,7 +1,7 @@
 """Checks of where a vehicle is and how it moves."""
 
 from collections.abc import Callable
-from itertools import pairwise
+from itertools import combinations, pairwise
 from math import inf, nan
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from autopilot.interface.vehicle_state import Mode
 from common.kernels import TICK_US
+from mission.log.flight_recorder import History
 from mission.log.flight_summary import cross_track_m, curved_items, planned_path, segment_distance_m
 from mission.scenario.flight.quantities import VALUES
 from mission.scenario.judging.seen import Judged, NothingToJudge, Rows, Seen, least, most
@@ -142,22 +143,29 @@ def clearance(seen: Seen, check: c.Check, asked: c.Clearance) -> Judged:
 
 
 def separation(seen: Seen, check: c.Check, asked: c.Separation) -> Judged:
-    """How near vehicles come to each other."""
+    """How near vehicles come to each other, or all others to one."""
     fleet = seen.others
     if len(fleet) < 2:
         raise NothingToJudge("there is one vehicle")
-    count = min(len(each.history.time_us) for each in fleet)
     start_s, end_s = seen.ends(check)
-    armed = [each.history.is_armed[:count] for each in fleet]
-    places = [each.history.pos_ned_true[:count].astype(float) for each in fleet]
-    time_s = seen.time_s[:count]
-    nearest = np.full(count, inf)
-    for i in range(len(fleet)):
-        for k in range(i):
-            both = armed[i] & armed[k]
-            gap = np.linalg.norm(places[i] - places[k], axis=1)
-            nearest = np.where(both, np.minimum(nearest, gap), nearest)
-    frames = (time_s >= start_s) & (time_s <= end_s) & np.isfinite(nearest)
-    if not frames.any():
+    gaps, times_s = [], []
+    for one, other in combinations(fleet, 2):
+        if check.vehicle in (None, one.vehicle.number, other.vehicle.number):
+            mine, theirs = _together(one.history, other.history)
+            time_s = one.time_s[mine]
+            both = one.history.is_armed[mine] & other.history.is_armed[theirs] & (time_s >= start_s) & (time_s <= end_s)
+            offset = one.history.pos_ned_true[mine][both].astype(float) - other.history.pos_ned_true[theirs][both]
+            gaps.append(np.linalg.norm(offset, axis=1))
+            times_s.append(time_s[both])
+    gap = np.concatenate(gaps)
+    if not len(gap):
         raise NothingToJudge("no two were armed together")
-    yield least("separation", nearest[frames], time_s[frames], asked.min_m, "m", what="separation")
+    yield least("separation", gap, np.concatenate(times_s), asked.min_m, "m", what="separation")
+
+
+def _together(one: History, other: History) -> tuple[Rows | slice, Rows | slice]:
+    """The frames of both that are of one time: of who stands for minutes few are kept."""
+    if np.array_equal(one.time_us, other.time_us):
+        return slice(None), slice(None)
+    _, mine, theirs = np.intersect1d(one.time_us, other.time_us, assume_unique=True, return_indices=True)
+    return mine, theirs

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,7 @@ from mission.scenario.scenario import ITEM_MARK
 Rows = npt.NDArray[Any]
 NO_PART = "there was no such part of the flight"
 Judged = Iterator[CheckResult]
+Event = TypeVar("Event", bound=tuple[Any, ...])
 
 
 class NothingToJudge(Exception):
@@ -106,6 +107,21 @@ class Seen:
         if not frames.any():
             raise NothingToJudge(NO_PART)
         return frames
+
+    def happened(self, check: c.Check, events: Sequence[Event]) -> list[Event]:
+        """Of events, which begin with their time [s], those in the part that a check looks at.
+
+        Raises:
+            NothingToJudge: there was no such part.
+        """
+        start_s, end_s = self.ends(check)
+        found = [event for event in events if start_s <= event[0] <= end_s]
+        if check.during is None:
+            return found
+        frames = self.frames(check)
+        times_us = [round(event[0] * 1e6) for event in found]
+        at = np.maximum(np.searchsorted(self.history.time_us, times_us, side="right") - 1, 0)
+        return [event for event, is_in in zip(found, frames[at], strict=True) if is_in]
 
 
 def most(

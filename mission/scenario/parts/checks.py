@@ -8,7 +8,19 @@ from typing import ClassVar, Literal, Self
 from pydantic import ConfigDict, Field, model_validator
 
 from mission.scenario.parts.conditions import Condition
-from mission.scenario.parts.part import Finite, Metres, OneOf, Part, Place, Point, Seconds, Short, check_order
+from mission.scenario.parts.part import (
+    Finite,
+    KeyRefusal,
+    Metres,
+    OneOf,
+    Part,
+    Place,
+    Point,
+    Seconds,
+    Short,
+    check_asked,
+    check_order,
+)
 from mission.scenario.parts.steps import ModeName
 
 
@@ -86,6 +98,11 @@ class Estimator(Part):
     percent: float = Field(default=100.0, gt=0.0, le=100.0)
     """Of the time."""
 
+    @model_validator(mode="after")
+    def _has_a_bound(self) -> Self:
+        check_asked(self, "horizontal_m", "vertical_m", "velocity_m_s", "tilt_deg", "heading_deg")
+        return self
+
 
 class Clearance(Short):
     """It keeps away from trees, walls, boxes, meshes and pads while armed: what starts on a pad needs a `from`."""
@@ -95,7 +112,7 @@ class Clearance(Short):
 
 
 class Separation(Short):
-    """All vehicles keep away from each other, while armed."""
+    """All vehicles keep away from each other, or one from all others, while armed."""
 
     short: ClassVar[str] = "min_m"
     min_m: Metres
@@ -108,7 +125,8 @@ class Duration(Part):
     max_s: Seconds | None = None
 
     @model_validator(mode="after")
-    def _is_in_order(self) -> Self:
+    def _has_a_bound(self) -> Self:
+        check_asked(self, "min_s", "max_s")
         check_order(self.min_s, self.max_s, ("min_s", "max_s"))
         return self
 
@@ -146,6 +164,11 @@ class Battery(Part):
     """At the nominal voltage."""
     remaining_min: float | None = Field(default=None, ge=0.0, le=1.0)
 
+    @model_validator(mode="after")
+    def _has_a_bound(self) -> Self:
+        check_asked(self, "used_max_mah", "used_max_wh", "remaining_min")
+        return self
+
 
 class AtEnd(Part):
     """How it stands when the flight is over."""
@@ -157,6 +180,13 @@ class AtEnd(Part):
     """North, east of home [m]."""
     within_m: float = Field(default=1.0, gt=0.0, le=10_000.0)
     """Of `near`."""
+
+    @model_validator(mode="after")
+    def _asks_something(self) -> Self:
+        check_asked(self, "is_armed", "is_landed", "is_crashed", "near")
+        if self.near is None and "within_m" in self.model_fields_set:
+            raise ValueError("within_m: is of near, which is left out")
+        return self
 
 
 class Reached(Short):
@@ -209,7 +239,8 @@ class Following(Part):
     has_collision: bool | None = False
 
     @model_validator(mode="after")
-    def _is_in_order(self) -> Self:
+    def _asks_something(self) -> Self:
+        check_asked(self, "in_band_min", "in_view_min", "distance_min_m", "distance_max_m", "has_collision")
         check_order(self.distance_min_m, self.distance_max_m, ("distance_min_m", "distance_max_m"))
         return self
 
@@ -220,11 +251,18 @@ FigureName = Literal[
 ]  # fmt: skip
 
 
+MeasuredName = Literal["park_distance_m", "park_turn_deg", "park_s", "policy_goto_s"]
+
+
 class Interventions(Short):
     """The guard changes the policy's decisions at most so often."""
 
     short: ClassVar[str] = "max_per_min"
     max_per_min: float = Field(ge=0.0)
+
+
+_OF_THE_WHOLE = ("at_end", "following", "scorecard", "interventions")
+_OF_ANY_MODE = ("modes", "separation")
 
 
 class Check(OneOf):
@@ -236,12 +274,12 @@ class Check(OneOf):
     besides: ClassVar[frozenset[str]] = frozenset({"name", "from_", "to", "vehicle", "during"})
     name: str = ""
     """How reports call it; left out: by what it is."""
-    from_: float | str | None = Field(default=None, alias="from")
+    from_: Finite | str | None = Field(default=None, alias="from")
     """Looks from this simulated time [s], or this mark, on; `item 3` is when that item of its mission is reached."""
-    to: float | str | None = None
+    to: Finite | str | None = None
     """Looks until this simulated time [s], or this mark."""
     during: ModeName | None = None
-    """Looks at the time in this flight mode only."""
+    """Looks at the time while armed in this flight mode only."""
     vehicle: int | None = Field(default=None, ge=1, le=50)
     """Of several the one to look at, from 1; left out: each."""
     altitude: Range | None = None
@@ -275,9 +313,12 @@ class Check(OneOf):
     no_contact: NoContact | None = None
     touch_down: TouchDown | None = None
     following: Following | None = None
-    scorecard: dict[FigureName, Range] | None = None
+    scorecard: dict[FigureName, Range] | None = Field(default=None, min_length=1)
     """Figures of the scorecard of FollowMe, as `honeyguide follow` shows them, each with its bounds."""
     interventions: Interventions | None = None
+    figures: dict[MeasuredName, Range] | None = None
+    """What `policy_park` and `policy_goto` have measured, each with its bounds: how far from the middle of its spot it
+    stood, how far it was turned, how long it took. Of several such steps the last counts."""
 
     @property
     def title(self) -> str:
@@ -288,4 +329,10 @@ class Check(OneOf):
     def _looks_at_something(self) -> Self:
         if not isinstance(self.from_, str) and not isinstance(self.to, str):
             check_order(self.from_, self.to, ("from", "to"))
+        name, given = self.name_chosen, {"from": self.from_, "to": self.to, "during": self.during}
+        for key in [key for key, value in given.items() if value is not None]:
+            if name in _OF_THE_WHOLE:
+                raise KeyRefusal((key,), f"{name} is of the whole flight, not of a part: leave it out")
+            if name in _OF_ANY_MODE and key == "during":
+                raise KeyRefusal((key,), f"{name} is of all flight modes: leave it out, or use from and to")
         return self

@@ -6,7 +6,7 @@ published schema says the same. Light to import.
 
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
@@ -22,6 +22,19 @@ Point = tuple[Finite, Finite, Finite]
 """North, east, down of home [m]."""
 Place = tuple[Finite, Finite]
 """North, east of home [m]."""
+
+
+def _file_name(name: str) -> str:
+    """The name, if a file or folder can be called so and is then nowhere else."""
+    if name in (".", "..") or not name.isprintable() or not {"/", "\\"}.isdisjoint(name):
+        raise ValueError(f"is the name of files and folders: no path, not {shown(name)}")
+    return name
+
+
+FileName = Annotated[
+    str, Field(max_length=240, json_schema_extra={"pattern": r"^[^/\\]*$"}), AfterValidator(_file_name)
+]
+"""What files and folders are called after; empty, where it may be left out."""
 
 
 class KeyRefusal(UserError):
@@ -49,6 +62,12 @@ def check_order(low: float | None, high: float | None, names: tuple[str, str] = 
     """Refuses bounds between which nothing is."""
     if low is not None and high is not None and low > high:
         raise ValueError(f"{names[0]} {low:g} is above {names[1]} {high:g}")
+
+
+def check_asked(part: BaseModel, *names: str) -> None:
+    """Refuses a check that passes whatever happens: it gives none of these."""
+    if all(getattr(part, name) is None for name in names):
+        raise ValueError(f"asks for nothing: needs {', '.join(names[:-1])} or {names[-1]}")
 
 
 class Part(BaseModel):

@@ -174,6 +174,14 @@ class Fence(Part):
     polygon_ne_m: tuple[Place, ...] | None = Field(default=None, min_length=3, max_length=100)
     keeps: Literal["in", "out"] = "in"
 
+    @model_validator(mode="after")
+    def _has_one_shape(self) -> Self:
+        if (self.circle_ne_m is None) != (self.radius_m is None):
+            raise ValueError("a circle has both circle_ne_m (its middle) and radius_m")
+        if (self.circle_ne_m is None) == (self.polygon_ne_m is None):
+            raise ValueError("a fence is either a circle (circle_ne_m, radius_m) or a polygon (polygon_ne_m)")
+        return self
+
 
 class SetMode(Short):
     """Chooses a flight mode."""

@@ -6,7 +6,7 @@ end.
 """
 
 from enum import Enum
-from math import atan2, inf, isfinite, pi, sin
+from math import atan2, inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,6 @@ _YAW_MAX = 1.5  # [rad/s]
 _SEARCH_PERIOD_S = 24.0  # of a search towards the phone: at first it looks there,
 _SEARCH_FACES_S = 4.0  # then there from other sides, since trees may hide who is there,
 _SEARCH_ROUNDS_S = 13.0  # and then round itself
-_AHEAD_S = 13.0  # without a phone it first looks where they went,
-_SWING_RAD, _SWING_S = 0.7, 6.5  # and to both sides of it: twice
 _THERE_M = 2.0  # so near the stand-off it looks round
 _RISEN_US = 2_000_000  # for so long it stays over the owner
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
@@ -126,7 +124,7 @@ class Guard:
         return self.senses.is_heard and self.senses.has_met_others
 
     def _searched(self, own: Own, is_searching: bool) -> tuple[Floats, float, float]:
-        """Up, out of people's way; towards the phone, no nearer than a stand-off, and round it; without one it looks.
+        """Up, out of people's way; towards the phone, no nearer than a stand-off, and round it; without one it turns.
 
         With one it turns on the spot too now and then: the phone may be wrong.
         """
@@ -153,11 +151,9 @@ class Guard:
             if phase_s < _SEARCH_ROUNDS_S:
                 return level + s.search_round_speed * np.array([-way[1], way[0]]) / far_m, down, yaw_rate
             return level, down, s.search_yaw_rate
-        lost_s = self.senses.silence_s(own) - s.search_s
-        if lost_s > _AHEAD_S or not self.senses.seen.sights:
+        if is_searching or not self.senses.seen.sights:
             return np.zeros(2), down, s.search_yaw_rate
-        swing_rad = _SWING_RAD * sin(2.0 * pi * max(lost_s, 0.0) / _SWING_S)
-        return np.zeros(2), down, self._facing(self._last_bearing(own) + swing_rad, own)
+        return np.zeros(2), down, self._facing(self._last_bearing(own), own)
 
     def _last_bearing(self, own: Own) -> float:
         """To where the owner was going when they were seen last [rad], in ned."""

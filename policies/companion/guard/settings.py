@@ -61,7 +61,11 @@ class GuardSettings(BaseModel):
     search_among_s: float = Field(default=2.5, gt=0.0, le=LONG_S)
     """The same where others were met not long ago and the phone is heard: the owner goes on, behind one of them."""
     lost_s: float = Field(default=60.0, gt=0.0, le=LONG_S)
-    """After so long control goes back, in Hold."""
+    """After so long control goes back, in Hold ..."""
+    return_s: float = Field(default=60.0, ge=0.0, le=LONG_S)
+    """... and after so long in it, the owner still not seen, it asks for Return; 0: stays in Hold."""
+    resume_s: float = Field(default=30.0, ge=0.0, le=LONG_S)
+    """So long after the position was lost it may follow again by itself, if it is still in the air; 0: never."""
     search_speed: float = Field(default=4.0, gt=0.0, le=20.0)
     """[m/s] towards the phone."""
     search_stand_off_m: float = Field(default=5.0, gt=0.0, le=20.0)

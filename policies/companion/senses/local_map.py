@@ -133,10 +133,16 @@ class LocalMap:
         np.maximum.at(self._over, (rows, columns), points[:, 2])
         self._over_us[rows, columns] = now_us
 
-    def room_up_m(self, pos_ned: Vector, now_us: int) -> float:
-        """How far up it is [m] to the lowest of what was seen over where the vehicle is; inf: to nothing."""
+    def room_up_m(self, pos_ned: Vector, now_us: int, hold_us: int = _HOLD_US) -> float:
+        """How far up it is [m] to the lowest of what was seen over where the vehicle is; inf: to nothing.
+
+        Args:
+            pos_ned: where it is.
+            now_us: the vehicle's clock.
+            hold_us: so long ago what was seen counts.
+        """
         rows, columns = cells_of(np.array(pos_ned[:2]) + self._own)
-        over = np.where(self._over_us[rows, columns] > now_us - _HOLD_US, self._over[rows, columns], -np.inf)
+        over = np.where(self._over_us[rows, columns] > now_us - hold_us, self._over[rows, columns], -np.inf)
         over = over[over < pos_ned[2]]
         return pos_ned[2] - float(over.max()) if len(over) else inf
 

@@ -4,7 +4,7 @@ A decision ten times a second: on each new image, and where none comes in time o
 then. A guard that does not believe the pilot bounds what it asks for. Where the owner is lost, it does not fly.
 """
 
-from math import isclose
+from math import isclose, isfinite
 from typing import Protocol
 
 import numpy as np
@@ -32,6 +32,8 @@ DECISION_LATE_US = 50_000  # and is waited for this much longer
 IMAGE_OLD_US = 500_000  # guess: five images missed, 3 m at full speed
 IMAGE_EARLY_US = 500_000  # telemetry may be so much later than an image; of a later stamp nobody knows the age
 GUARDED_OLD_US = 2_500_000  # the guard stands still before
+LOOKED_UP_US = 10_000_000_000  # longer than anybody waits: what was overhead still is, where the vehicle stands
+SEEN_S = 1.0  # the last sight of who is in sight is no older
 OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
 NO_IMAGES = "no new pictures"
 OTHER_CLOCK = "pictures from the future"
@@ -85,6 +87,8 @@ class Following:
         self.guard = (
             Guard(guard, self._senses) if guard is not None and is_guarded and self._senses is not None else None
         )
+        after = (guard.return_s, guard.resume_s) if guard is not None and is_guarded else (0.0, 0.0)
+        self.return_s, self.resume_s = after
         self._watch = OwnerWatch(hears=hears) if self._senses is None else self._senses.watch
         self._tracked = TrackedObserver(self._senses) if is_tracked and self._senses is not None else None
         self._observer = None if is_tracked else Observer(pilot.kind)
@@ -158,6 +162,14 @@ class Following:
         if self.guard is not None and self._is_flying:
             return "owner lost" if self.guard.is_lost(own) else ""
         return "owner lost" if self._watch.silence_s(own.boot_us) > OWNER_LOST_S else ""
+
+    def is_alone(self, own: Own) -> bool:
+        return self._senses is not None and self._senses.silence_s(own) > SEEN_S
+
+    def is_covered(self, own: Own) -> bool:
+        if self._senses is None or not isfinite(own.pos_ned[0]):
+            return False
+        return isfinite(self._senses.map.room_up_m(own.pos_ned, own.boot_us, LOOKED_UP_US))
 
     def begin(self, own: Own) -> None:
         self._pilot.reset()

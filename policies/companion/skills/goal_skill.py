@@ -45,6 +45,7 @@ class GoalSkill:
         guard: who bounds it; None: nobody.
     """
 
+    return_s = resume_s = 0.0  # who goes to goals has lost nobody
     flying: str
     goals: Goals | OwnerGoal  # this and the next two from `attach` on
     ranges: Ranges
@@ -91,6 +92,12 @@ class GoalSkill:
 
     def loss(self, own: Own) -> str:  # noqa: ARG002
         return "" if self.goals.goal is not None else self.goals.done or NO_GOAL
+
+    def is_alone(self, own: Own) -> bool:  # noqa: ARG002
+        return False
+
+    def is_covered(self, own: Own) -> bool:  # noqa: ARG002
+        return False
 
     def begin(self, own: Own) -> None:
         self._forget()

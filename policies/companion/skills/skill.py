@@ -28,6 +28,8 @@ class Skill(Protocol):
     drives: bool  # ground vehicles, and flies none
     is_along_nose: bool  # its velocities are ahead, right and down
     action_size: int
+    return_s: float  # after so long in Hold without whom it has lost the vehicle is sent home; 0: never
+    resume_s: float  # so long after a lost position it may go on by itself; 0: never
     seen: Floats  # the vector that was decided on last
     wanted: Velocity  # what the last action asked for, before a guard
     stances: tuple[str, ...]  # that its guard may take; a log keeps their places: new ones go to the end
@@ -65,6 +67,14 @@ class Skill(Protocol):
 
     def loss(self, own: Own) -> str:
         """Why it cannot fly, or need not any more, though it sees; "" if it can."""
+        ...
+
+    def is_alone(self, own: Own) -> bool:
+        """Whether who is followed is not seen now."""
+        ...
+
+    def is_covered(self, own: Own) -> bool:
+        """Whether something was seen over the vehicle."""
         ...
 
     def begin(self, own: Own) -> None:

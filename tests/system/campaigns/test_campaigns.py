@@ -6,9 +6,7 @@ import re
 import signal
 import subprocess
 import sys
-from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 import yaml
@@ -21,6 +19,7 @@ from mission.campaign.sampling import sample_orders
 from mission.campaign.workers.fly_run import fly_run
 from mission.cli import app
 from tests.documents import ROOT, blocks
+from tests.ray_head import RayHead
 
 GALE = ROOT / "mission" / "campaign" / "ready" / "gale-in-hold.campaign.yaml"
 PAGE = ROOT / "docs" / "how-to" / "campaigns.md"
@@ -123,7 +122,7 @@ def test_a_run_that_crashes_or_hangs_is_a_finding(tmp_path):
     errors = {run["values"]["wind.speed_m_s"]: run["error"] for run in runs_in(tmp_path / "out")}
     assert errors == {
         0.0: "",
-        1.0: "its process was ended by SIGSEGV",
+        1.0: "its process died (signal 11, Segmentation fault)",
         2.0: "hung: its process was ended after 20 s",
     }
     assert "not met" in result.output
@@ -205,53 +204,16 @@ def test_the_fault_of_the_example_comes_before_its_shortest_flight_ends(tmp_path
     assert "never happened" not in record.error
 
 
-RAY_HEAD = "127.0.0.1:6399"
-
-
-class Head:
-    """A Ray head with two workers, and all that it starts, in a session of its own."""
-
-    def __init__(self):
-        flags = ["--head", "--block", "--node-ip-address=127.0.0.1", "--port=6399", "--num-cpus=2"]
-        more = ["--include-dashboard=false", "--disable-usage-stats", "--object-store-memory=100000000"]
-        self._process = subprocess.Popen(
-            [Path(sys.executable).parent / "ray", "start", *flags, *more],
-            cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, text=True,
-            start_new_session=True,
-        )  # fmt: skip
-        for line in self._process.stdout:
-            if "Ray runtime started" in line:
-                break
-
-    def end(self):
-        os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait(60.0)
-        self._process.stdout.close()
-
-
-def workers_that_fly():
-    """Process numbers of Ray's workers that have a run."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        with suppress(OSError):
-            if entry.name.isdigit() and (entry / "cmdline").read_bytes().startswith(b"ray::_fly"):
-                found.append(int(entry.name))
-    return found
-
-
 @pytest.mark.slow
 def test_ray_loses_no_run_when_a_worker_dies_and_says_when_its_head_does(tmp_path):
     pytest.importorskip("ray", reason="needs the extra 'ray'")
     file, folder = tmp_path / "hop.campaign.yaml", tmp_path / "out"
     file.write_text(HOP)
     line = command(file, folder)
-    head = Head()
+    head = RayHead(6399)
     try:
-        process = subprocess.Popen([*line, "--ray", RAY_HEAD], cwd=ROOT, stdout=subprocess.PIPE, text=True)
-        while process.poll() is None and not workers_that_fly():
-            wall_sleep_s(0.05)
-        for pid in workers_that_fly()[:1]:
-            os.kill(pid, signal.SIGKILL)
+        process = subprocess.Popen([*line, "--ray", head.address], cwd=ROOT, stdout=subprocess.PIPE, text=True)
+        assert head.kill_worker("_fly", process)
         output, _ = process.communicate(timeout=MOST_S)
         assert process.returncode == 0, output
         found = runs_in(folder)
@@ -259,7 +221,7 @@ def test_ray_loses_no_run_when_a_worker_dies_and_says_when_its_head_does(tmp_pat
         assert not any(run["is_lost"] for run in found)
 
         process = subprocess.Popen(
-            [*line, "--ray", RAY_HEAD, "--runs", "500"], cwd=ROOT, stdout=subprocess.PIPE, text=True
+            [*line, "--ray", head.address, "--runs", "500"], cwd=ROOT, stdout=subprocess.PIPE, text=True
         )
         while process.poll() is None and len(runs_in(folder)) < 8:
             wall_sleep_s(0.05)

@@ -24,6 +24,8 @@ async def airborne(vehicle):
 
 async def test_hops(airborne, flight):
     flight.check(altitude={"min": 3, "max": 7}, from_="up", to="end")
+    flight.check(modes=MODES)
+    flight.check(altitude={"min": 4, "max": 6}, during=MODES[1], from_="up", to="end")
     flight.mark("up")
     await airborne.sleep(3.0)
     flight.mark("end")
@@ -49,10 +51,13 @@ def wait_for(port):
 
 
 @pytest.mark.slow
-def test_tests_of_a_foreign_folder_fly_a_vehicle_of_another_process(tmp_path):
+@pytest.mark.parametrize(
+    ("dialect", "modes"), [("px4", ["takeoff", "hold", "land"]), ("ardupilot", ["guided", "brake", "land"])]
+)
+def test_tests_of_a_foreign_folder_fly_a_vehicle_of_another_process(tmp_path, dialect, modes):
     (tmp_path / "other").mkdir()
-    (tmp_path / "test_hops.py").write_text(TESTS)
-    with IdleVehicle(tmp_path / "other") as vehicle:
+    (tmp_path / "test_hops.py").write_text(TESTS.replace("MODES", str(modes)))
+    with IdleVehicle(tmp_path / "other", "--dialect", dialect) as vehicle:
         wait_for(vehicle.api_port)
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--junit-xml", "junit.xml"]
         result = subprocess.run(
@@ -68,7 +73,7 @@ def test_tests_of_a_foreign_folder_fly_a_vehicle_of_another_process(tmp_path):
     cases = {
         str(case.get("name")).partition("[")[0]: case for case in ET.parse(tmp_path / "junit.xml").iter("testcase")
     }
-    assert [child.tag for child in cases["test_hops"]] == []
+    assert [child.tag for child in cases["test_hops"]] == [], result.stdout
     assert "low: asked altitude at most 2 m" in result.stdout
     assert cases["test_too_much_is_asked"].find("failure") is not None
     skipped = cases["test_a_fault"].find("skipped")

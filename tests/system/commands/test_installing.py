@@ -4,12 +4,10 @@ import os
 import subprocess
 import sys
 import venv
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[3]
-
+from tests.documents import ROOT, blocks
 
 PIP = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
 # Where what an extra brings is imported, when its commands are run.
@@ -42,6 +40,13 @@ def wheel_in(folder):
     return wheel
 
 
+def write_examples(folder):
+    """The files of the pages on scenarios and on pytest, as they stand there, under the names that they give."""
+    for page, language in (("scenarios", "yaml"), ("pytest", "python")):
+        text = blocks(ROOT / "docs" / "how-to" / f"{page}.md", language)[0]
+        (folder / text.partition("\n")[0].removeprefix("# ")).write_text(text)
+
+
 @pytest.mark.slow
 def test_a_bare_environment_flies_and_imports_all_but_what_extras_bring(tmp_path):
     """Downloads what a plain install needs, or takes it from pip's cache."""
@@ -65,19 +70,15 @@ def test_a_bare_environment_flies_and_imports_all_but_what_extras_bring(tmp_path
     assert flight.returncode == 1, flight.stderr  # it ended before its mission
     assert "mission not finished" in flight.stdout
     assert (tmp_path / "flight" / "flight.ulg").stat().st_size > 100_000
-    (tmp_path / "hop.scenario.yaml").write_text("vehicle: {script: [arm, {takeoff: 5}, land]}\n")
-    tested = run(python.with_name("honeyguide"), "test", "hop.scenario.yaml")
-    assert tested.returncode == 0, tested.stderr
-    assert "1 of 1 passed" in tested.stdout
+    write_examples(tmp_path)
+    tested = run(python.with_name("honeyguide"), "test", "delivery.scenario.yaml")
+    assert tested.returncode == 0, tested.stdout + tested.stderr
+    assert "2 of 2 passed" in tested.stdout
     subprocess.run([python, *PIP, "install", *constraints, "pytest"], check=True, env=environment)
-    (tmp_path / "test_hop.py").write_text(
-        "async def test_hop(vehicle, flight):\n    flight.check(tilt={'max': 40})\n    await vehicle.wait_ready()\n"
-        "    await vehicle.arm()\n    await vehicle.takeoff(5.0)\n    await vehicle.land()\n"
-    )
     (tmp_path / "pytest.ini").write_text("[pytest]\nfilterwarnings = error\n")
-    flown = run(python.with_name("pytest"), "test_hop.py", "hop.scenario.yaml")
+    flown = run(python.with_name("pytest"), "test_delivery.py", "delivery.scenario.yaml")
     assert flown.returncode == 0, flown.stdout + flown.stderr
-    assert "2 passed" in flown.stdout
+    assert "5 passed" in flown.stdout
     refused = run(python.with_name("honeyguide"), "fly", "--engine", "pybullet")
     assert refused.returncode == 2, refused.stderr
     assert "the extra 'engines'" in refused.stderr

@@ -10,10 +10,10 @@ import pytest
 
 from common.clock import wall_sleep_s
 from tests.documents import ROOT
-from tests.system.datasets.killing import children, processes_with
+from tests.ray_head import RayHead
+from tests.system.datasets.killing import children
 
 MOST_S = 240.0
-RAY_HEAD = "127.0.0.1:6398"
 pytestmark = pytest.mark.slow
 
 
@@ -72,27 +72,13 @@ def test_a_killed_process_and_a_killed_collection_change_nothing(tmp_path, undis
 
 def test_ray_makes_the_same_dataset_when_a_worker_dies(tmp_path, undisturbed):
     pytest.importorskip("ray", reason="needs the extra 'ray'")
-    flags = ["--head", "--block", "--node-ip-address=127.0.0.1", "--port=6398", "--num-cpus=2"]
-    more = ["--include-dashboard=false", "--disable-usage-stats", "--object-store-memory=100000000"]
-    head = subprocess.Popen(
-        [sys.executable, "-m", "ray.scripts.scripts", "start", *flags, *more],
-        cwd=ROOT, env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])},
-        stdout=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
+    head = RayHead(6398)
     try:
-        for line in head.stdout:
-            if "Ray runtime started" in line:
-                break
         out = tmp_path / "out"
-        process = subprocess.Popen(command(out, "--ray", RAY_HEAD), cwd=ROOT, stdout=subprocess.PIPE, text=True)
-        while process.poll() is None and not processes_with("ray::_collect"):
-            wall_sleep_s(0.02)
-        for pid in processes_with("ray::_collect")[:1]:
-            os.kill(pid, signal.SIGKILL)
+        process = subprocess.Popen(command(out, "--ray", head.address), cwd=ROOT, stdout=subprocess.PIPE, text=True)
+        assert head.kill_worker("_collect", process)
         output, _ = process.communicate(timeout=MOST_S)
         assert process.returncode == 0, output
         assert content(out) == undisturbed
     finally:
-        os.killpg(head.pid, signal.SIGKILL)
-        head.wait(60.0)
-        head.stdout.close()
+        head.end()

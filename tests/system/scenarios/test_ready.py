@@ -7,36 +7,25 @@ from mission.scenario.scenario_file import READY, find_files, parse_scenario, re
 from tests.documents import ROOT, blocks
 
 PAGE = ROOT / "docs" / "how-to" / "scenarios.md"
-QUICK = ("gnss-loss", "motor-out-hexa", "precision-landing", "square")
 REPEATED = ("landing-on-a-rover", "gnss-jamming", "forest-crossing")
+OTHERS = tuple(name for path in find_files([READY]) if (name := path.name.partition(".")[0]) not in REPEATED)
 
 
 def scenario(name):
     return read_scenario(READY / f"{name}.scenario.yaml")
 
 
-def flies(name):
+@pytest.mark.parametrize("name", OTHERS)
+def test_scenario_passes(name):
     result = run_scenario(scenario(name))
     assert result.passed, result.failures
 
 
-@pytest.mark.parametrize("name", QUICK)
-def test_scenario_passes(name):
-    flies(name)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [name for path in find_files([READY]) if (name := path.name.partition(".")[0]) not in QUICK]
-)
-def test_every_other_scenario_passes(name):
-    flies(name)
-
-
-@pytest.mark.parametrize("name", [REPEATED[0], *(pytest.param(each, marks=pytest.mark.slow) for each in REPEATED[1:])])
-def test_logs_are_the_same_bytes_at_each_run(name, tmp_path):
+@pytest.mark.parametrize("name", REPEATED)
+def test_scenario_passes_and_its_logs_are_the_same_bytes_at_each_run(name, tmp_path):
     def logs(folder):
         result = run_scenario(scenario(name), folder=folder)
+        assert result.passed, result.failures
         paths = [*result.ulogs, *result.tlogs]
         assert paths
         return [(ROOT / path).read_bytes() for path in paths]

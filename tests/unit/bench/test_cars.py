@@ -1,5 +1,6 @@
 """The page of the cars is what its recorded runs say, and the policy that ships is the one that was chosen."""
 
+import numpy as np
 import pytest
 
 from bench.cars.__main__ import RUNS, shipped_seed
@@ -20,6 +21,25 @@ def recorded():
 
 def test_the_page_is_what_its_recorded_runs_say():
     assert (DOCS / "cars.md").read_text(encoding="utf-8") == page_text(recorded())
+
+
+def test_what_the_page_says_of_the_strength_of_imitation_is_what_was_trained():
+    runs, text = recorded(), " ".join((DOCS / "cars.md").read_text(encoding="utf-8").split())
+    weak, strong = (f"parking1-goals-gail{kind}" for kind in ("", "-strong"))
+    strengths = [
+        configured(EXPERIMENTS[name], 1, "runs").behavior.reward_signals.gail.strength
+        for name in ("parking1-gail", weak, strong)
+    ]
+    assert strengths == [0.002, 0.002, 0.05]
+    on_goals, on_new = (
+        [
+            100.0 * np.mean([run.evaluations[k].successes / run.evaluations[k].episodes for run in runs[name]])
+            for name in (weak, strong)
+        ]
+        for k in (0, 1)
+    )
+    assert on_goals == [100.0, 100.0]
+    assert f"100 % on those goals, {on_new[0]:.0f} % on new spots" in text
 
 
 def test_recorded_runs_were_judged_on_what_their_experiments_name():

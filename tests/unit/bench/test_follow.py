@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bench.cars.result import Point
+from bench.follow.__main__ import published, unpublished
 from bench.follow.page import duration, write_page
 from bench.follow.result import Judged, Result, read, read_all, write, write_all
 from bench.follow.stages import CELLS, OWNER_SPEEDS, STAGES, in_order
@@ -66,6 +67,23 @@ def test_page_tells_what_was_measured_and_what_was_not(tmp_path):
 
 def test_page_without_any_result_is_still_a_page(tmp_path):
     assert "none yet" in write_page({}, tmp_path).read_text(encoding="utf-8")
+
+
+def test_policies_that_ship_stay_unless_new_ones_are_published(tmp_path):
+    results, ships = tmp_path / "results", tmp_path / "pretrained"
+    results.mkdir()
+    ships.mkdir()
+    (ships / "follow-me.pt").write_bytes(b"old")
+    (ships / "follow-me-vision.pt").write_bytes(b"same")
+    for name, content in (("student-1", b"new"), ("vision-only-1", b"same"), ("tuned-1", b"no"), ("student-2", b"no")):
+        (results / f"{name}.pt").write_bytes(content)
+    (line,) = unpublished(results, ships)
+    assert line == f"{results / 'student-1.pt'}: is another than follow-me.pt, which still ships: --publish"
+    assert (ships / "follow-me.pt").read_bytes() == b"old"
+    assert len(published(results, ships)) == 1
+    assert (ships / "follow-me.pt").read_bytes() == b"new"
+    assert {path.name for path in ships.iterdir()} == {"follow-me.pt", "follow-me-vision.pt"}
+    assert not unpublished(results, ships)
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(90.0, "90 s"), (900.0, "15.0 min"), (7200.0, "2.0 h")])

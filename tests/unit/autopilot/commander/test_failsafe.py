@@ -67,6 +67,17 @@ def test_pilot_may_take_over_from_a_failsafe():
     assert not rig.state.is_failsafe
 
 
+def test_a_pilot_who_takes_over_in_the_same_mode_is_told_of_by_a_heartbeat_at_once():
+    rig = flying_away()
+    rig.flags &= ~POSITION_VALID
+    rig.run(1.0)
+    assert (rig.state.mode, rig.state.is_failsafe) == (Mode.LAND, True)
+    count = rig.recorder.heartbeats
+    assert rig.fc.request(ChangeMode(Mode.LAND)).verdict is Verdict.ACCEPTED
+    assert not rig.state.is_failsafe
+    assert rig.recorder.heartbeats > count
+
+
 def test_critical_battery_without_position_lands():
     rig = flying_away()
     rig.flags &= ~POSITION_VALID

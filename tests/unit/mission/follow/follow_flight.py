@@ -15,11 +15,15 @@ def config(pace="walk", seed=3, **owner):
     return FlightConfig(owner=OwnerConfig(pace=pace, **owner), world=FOLLOW_WORLD, seed=seed)
 
 
-def following(folder=None, *, pace="walk", seed=3, pilot=None, has_guard=True, **owner):
+def following(
+    folder=None, *, pace="walk", seed=3, pilot=None, has_guard=True, settings=None, dialect="px4", links=(), **owner
+):
     """A flight that follows, and its companion."""
-    guard = GuardSettings(is_on=has_guard)
-    made = config(pace, seed, **owner)
-    flight, companion = flight_with_companion(made, pilot or ScriptedFollower(), folder=folder, guard=guard)
+    guard = GuardSettings(is_on=has_guard, **(settings or {}))
+    made = config(pace, seed, **owner).model_copy(update={"dialect": dialect})
+    flight, companion = flight_with_companion(
+        made, pilot or ScriptedFollower(), links=links, folder=folder, guard=guard
+    )
     flight.fly(take_off, seconds=40.0)
     advance(flight, 5.0, lambda: companion.phase is Phase.FLYING)
     assert companion.phase is Phase.FLYING, (companion.phase, companion.trouble, flight.drone.texts)
@@ -30,6 +34,12 @@ def advance(flight, seconds, is_enough=lambda: False):
     """Flies on for a time, or until it is enough."""
     end_us = flight.time_us + round(seconds * 1e6)
     flight.run(lambda _: is_enough() or flight.time_us >= end_us)
+
+
+def hide(flight):
+    """From now on nobody is to be seen."""
+    flight.owner.cast.rows.params.numpy()["owner_hides_per_min"] = 60.0
+    flight.owner.cast.rows.params.numpy()["owner_hide_s"] = 1e4
 
 
 class LossyLink:

@@ -26,7 +26,7 @@ from policies.tasks.flight.hover_bank import hover_bank
 from policies.tasks.flight.own_state import OwnState
 from policies.tasks.follow_me.observe import EGO, OwnerReport, observe_rows, vector_elements
 from sim.advance import RigArrays
-from tests.unit.mission.follow.follow_flight import advance, config, following, lose
+from tests.unit.mission.follow.follow_flight import advance, config, following, hide, lose
 from tests.unit.policies.companion.test_pilot import believer
 
 
@@ -136,12 +136,6 @@ def test_telemetry_that_stops_ends_in_hold_within_the_stated_time():
     advance(flight, 3.0, lambda: flight.controller.state.mode is Mode.HOLD)
     assert flight.controller.state.mode is Mode.HOLD
     assert flight.time_us - stopped_us <= TELEMETRY_OLD_US + 200_000
-
-
-def hide(flight):
-    """From now on nobody is to be seen."""
-    flight.owner.cast.rows.params.numpy()["owner_hides_per_min"] = 60.0
-    flight.owner.cast.rows.params.numpy()["owner_hide_s"] = 1e4
 
 
 def test_an_owner_lost_for_five_seconds_ends_in_hold_where_there_is_no_guard():

@@ -5,7 +5,7 @@ What is imported here is not imported in each of them.
 
 import pytest_honeyguide
 from mission.pytest_plugin import running, scenario_items  # noqa: F401
-from mission.scenario import session  # noqa: F401
+from mission.scenario import one_run  # noqa: F401
 
 
 def inner(pytester, *options):

@@ -1,6 +1,9 @@
 """Scenario files are collected by a plain `pytest`, one test per seed, and say what `honeyguide test` says."""
 
+from pathlib import Path
+
 import pytest
+import warp as wp
 from typer.testing import CliRunner
 
 from mission.cli import app
@@ -24,7 +27,9 @@ def test_each_seed_is_a_test(pytester, run):
     run("-k", "seed1").assert_outcomes(passed=1)
 
 
-def test_what_failed_is_told_as_by_the_command(pytester, run):
+def test_what_failed_is_told_as_by_the_command(pytester, run, monkeypatch):
+    kernels = Path(wp.config.kernel_cache_dir).parent  # pytester has taken the home folder away
+    monkeypatch.setenv("WARP_CACHE_PATH", str(kernels))
     (pytester.path / "hop.scenario.yaml").write_text(HOP + "checks: [{tilt: {max: 3}}]\n")
     told = CliRunner().invoke(app, ["test", "hop.scenario.yaml", "--jobs", "1", "--keep", "kept"]).stdout
     result = run("--honeyguide-keep", "kept")
@@ -33,6 +38,9 @@ def test_what_failed_is_told_as_by_the_command(pytester, run):
     for line in told.splitlines()[first : first + 3]:
         assert line in result.outlines
     assert (pytester.path / "kept" / "hop-seed1" / "flight.ulg").is_file()
+    result = run("-k", "seed2")
+    file = pytester.path / "hop.scenario.yaml"
+    result.stdout.fnmatch_lines([f"  again: honeyguide test {file} --seeds 2 --keep failed"])
 
 
 def test_all_are_kept_if_asked_for(pytester, run):
@@ -41,6 +49,13 @@ def test_all_are_kept_if_asked_for(pytester, run):
     assert not list((pytester.path / "kept").glob("*"))
     run("--honeyguide-keep", "kept", "--honeyguide-keep-all").assert_outcomes(passed=2)
     assert sorted(each.name for each in (pytester.path / "kept").iterdir()) == ["hop-seed1", "hop-seed2"]
+
+
+def test_runs_of_equal_names_are_kept_by_their_folders(pytester, run):
+    for name in ("a", "b"):
+        pytester.mkdir(name).joinpath("hop.scenario.yaml").write_text(HOP)
+    run("--honeyguide-keep", "kept", "--honeyguide-keep-all", "-k", "seed1").assert_outcomes(passed=2)
+    assert sorted(each.name for each in (pytester.path / "kept").iterdir()) == ["a-hop-seed1", "b-hop-seed1"]
 
 
 def test_a_wrong_file_is_one_sentence(pytester, run):

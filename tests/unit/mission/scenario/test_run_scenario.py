@@ -179,6 +179,29 @@ def test_a_part_that_does_not_exist_fails_each_check(check):
     assert found.happened == "there was no such part of the flight"
 
 
+def test_what_happens_counts_in_the_flight_mode_that_is_asked_for():
+    asked = {
+        "said in time": {"heard": "landed", "during": "land"},
+        "said too late": {"heard": "landed", "during": "takeoff"},
+        "not said before": {"not_heard": "landed", "during": "takeoff"},
+        "said nevertheless": {"not_heard": "landed", "during": "land"},
+        "silent in no mission": {"not_heard": "landed", "during": "mission"},
+        "touched nothing in no mission": {"no_contact": {}, "during": "mission"},
+        "reached in no mission": {"reached": 0, "during": "mission"},
+        "landed softly": {"touch_down": 1.0, "during": "land"},
+        "touched down in hold": {"touch_down": 1.0, "during": "hold"},
+        "held": {"duration": {"max_s": 3.5}, "during": "hold"},
+        "held and landed": {"duration": {"min_s": 5}, "during": "hold"},
+        "flew no mission": {"duration": {"max_s": 5}, "during": "mission"},
+    }
+    found = by_name(flown(checks=[{**check, "name": name} for name, check in asked.items()]))
+    assert {name for name in asked if found[name].passed} == {
+        "said in time", "not said before", "landed softly", "held",
+    }  # fmt: skip
+    for name in ("silent in no mission", "touched nothing in no mission", "reached in no mission", "flew no mission"):
+        assert found[name].happened == "there was no such part of the flight"
+
+
 def test_standing_is_no_touch_down():
     (found,) = flown(script=["arm", {"wait": 2}, "disarm"], checks=[{"touch_down": 1.0}]).checks
     assert not found.passed
@@ -216,7 +239,12 @@ def test_python_flies_and_names_moments(tmp_path):
 
 def test_several_vehicles_are_judged_one_by_one_and_together(tmp_path):
     vehicles = [{"script": HOP, "count": 2}, {"airframe": "rover", "script": ["arm", {"wait": 2}, "disarm"]}]
-    checks = [{"separation": 5}, {"at_end": {"is_armed": False}}, {"once": "altitude > 4", "vehicle": 1}]
+    checks = [
+        {"separation": 5},
+        {"at_end": {"is_armed": False}},
+        {"once": "altitude > 4", "vehicle": 1},
+        {"separation": 5, "vehicle": 3, "name": "from the rover", "to": 4},
+    ]
     result = run_scenario(
         Scenario.model_validate({"world": PLAIN, "vehicles": vehicles, "checks": checks}), folder=tmp_path / "run"
     )
@@ -227,6 +255,17 @@ def test_several_vehicles_are_judged_one_by_one_and_together(tmp_path):
         "vehicle 1: at end: crashed",
     ]
     assert len(result.ulogs) == 3
+
+
+def test_vehicles_that_start_in_each_other_are_refused_with_any_seed():
+    vehicles = [{"start": {"ne_m": [5, 5]}}, {"start": {"ne_m": [5.5, 5]}}]
+    with pytest.raises(UserError, match=r"vehicles\[1\].start.ne_m: vehicles 1 and 2 start 0.5 m apart"):
+        run_scenario(Scenario.model_validate({"world": PLAIN, "vehicles": vehicles}), seed=7)
+
+
+def test_a_plan_that_is_not_there_is_an_error_of_the_script():
+    result = flown([{"fly_plan": "/none/round.plan"}])
+    assert result.error.startswith("step 1, fly_plan: /none/round.plan: ")
 
 
 def test_who_never_becomes_ready_says_why():

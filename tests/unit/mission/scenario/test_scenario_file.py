@@ -2,7 +2,6 @@
 
 import pickle
 import shutil
-from dataclasses import fields
 from pathlib import Path
 from typing import get_args
 
@@ -12,19 +11,17 @@ from PIL import Image
 
 import common.airframes
 from autopilot.interface.vehicle_state import Mode
-from common.intervals import Interval
 from mission.console.option_checks import UserError
 from mission.flight_settings import WORLD_KINDS
 from mission.scenario.flight.building import check_scenario, flight_configs
 from mission.scenario.flight.flying import ACTIONS
 from mission.scenario.judging.judge import JUDGES
 from mission.scenario.keeping import keep_scenario
-from mission.scenario.parts.checks import Check, FigureName
+from mission.scenario.parts.checks import Check
 from mission.scenario.parts.faults import SensorName
 from mission.scenario.parts.steps import ModeName, Step, Takeoff
 from mission.scenario.scenario import Scenario, World, WorldName
 from mission.scenario.scenario_file import READY, find_files, parse_scenario, read_scenario
-from policies.tasks.follow_me.scorecard import Scorecard
 from sim.faults import BIAS_UNITS
 from sim.world.world import WorldConfig
 
@@ -114,6 +111,12 @@ def test_python_makes_the_same_scenario(tmp_path):
             "vehicle:\n  policy: {name: scripted, has_guard: false, guard: {owner_m: 2}}\n",
             "3: vehicle.policy.guard: it has none: has_guard is false",
         ),
+        ("about:", "seeds: [1, -1]\nabout:", "1: seeds[1]: must be at least 0, not -1"),
+        ("about:", "seeds: [2147483648]\nabout:", "1: seeds[0]: must be at most 2.14748e+09, not 2147483648"),
+        *(
+            ("about:", f"name: {name}\nabout:", f"1: name: is the name of files and folders: no path, not {name!r}")
+            for name in ("../esc", "/tmp/esc", "a\\b", "..")
+        ),
         ("about:", "aboot:", "1: aboot: unknown key; did you mean about?"),
         ("about: Up and down.", "about: [", "not YAML"),
         ("vehicle:\n", "vehicle:\n  plan: a.plan\n", "2: vehicle: plan and script: choose one"),
@@ -153,6 +156,11 @@ def test_python_makes_the_same_scenario(tmp_path):
         ),
         (
             "at_end: {is_armed: false}",
+            "figures: {park_seconds: {max: 5}}",
+            "8: checks[0].figures.park_seconds: must be park_distance_m, park_turn_deg, park_s or policy_goto_s, not",
+        ),
+        (
+            "at_end: {is_armed: false}",
             "duration: {min_s: 10, max_s: 5}",
             "8: checks[0].duration: min_s 10 is above max_s 5",
         ),
@@ -162,6 +170,11 @@ def test_python_makes_the_same_scenario(tmp_path):
             "8: checks[0].following: distance_min_m 3 is above distance_max_m 2",
         ),
         ("- at_end", "- tilt: {max: 3}\n    from: 8\n    to: 5\n  - at_end", "8: checks[0]: from 8 is above to 5"),
+        (
+            "  script:\n",
+            "  count: 3\n  start:\n    ne_m: [0, 30]\n  script:\n",
+            "5: vehicle.start.ne_m: is one place for 3 vehicles: write each in vehicles",
+        ),
         ("about:", "vehicles: [{}]\nabout:", "1: vehicles: there is vehicle, too: choose one"),
         ("- at_end", "- tilt: {max: 3}\n    speed: {max: 3}\n  - at_end", "names speed and tilt: put each in an entry"),
     ],
@@ -172,6 +185,66 @@ def test_a_fault_is_one_sentence_with_its_place(tmp_path, old, new, fault):
     assert fault in said
     assert said.startswith("hop.scenario.yaml")
     assert "\n" not in said
+
+
+@pytest.mark.parametrize(
+    ("check", "fault"),
+    [
+        (
+            "estimator",
+            ".estimator: asks for nothing: needs horizontal_m, vertical_m, velocity_m_s, tilt_deg or heading_deg",
+        ),
+        ("estimator: {percent: 90}", ".estimator: asks for nothing: needs horizontal_m,"),
+        ("duration: {}", ".duration: asks for nothing: needs min_s or max_s"),
+        ("battery:", ".battery: asks for nothing: needs used_max_mah, used_max_wh or remaining_min"),
+        ("at_end: {is_crashed: null}", ".at_end: asks for nothing: needs is_armed, is_landed, is_crashed or near"),
+        ("at_end: {within_m: 3}", ".at_end: within_m: is of near, which is left out"),
+        ("following: {has_collision: null}", ".following: asks for nothing: needs in_band_min,"),
+        ("scorecard: {}", ".scorecard: must not be empty"),
+        ("scorecard: {in_view: {}}", ".scorecard.in_view: needs min, max or both"),
+    ],
+)
+def test_a_check_that_asks_for_nothing_is_refused(tmp_path, check, fault):
+    assert f": checks[0]{fault}" in fault_of(HOP.replace("at_end: {is_armed: false}", check), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("check", "fault"),
+    [
+        ("at_end:\n    from: 3", "from: at_end is of the whole flight, not of a part: leave it out"),
+        ("at_end:\n    during: land", "during: at_end is of the whole flight"),
+        ("following:\n    to: 30", "to: following is of the whole flight"),
+        ("scorecard: {in_view: {min: 0.5}}\n    during: hold", "during: scorecard is of the whole flight"),
+        ("interventions: 3\n    from: 3", "from: interventions is of the whole flight"),
+        ("modes: [land]\n    during: land", "during: modes is of all flight modes: leave it out, or use from and to"),
+        ("separation: 3\n    during: land", "during: separation is of all flight modes"),
+        ("not_heard: x\n    to: .nan", "to"),
+    ],
+)
+def test_a_part_of_the_flight_that_a_check_does_not_look_at_is_refused(tmp_path, check, fault):
+    said = fault_of(HOP.replace("at_end: {is_armed: false}", check), tmp_path)
+    assert said.startswith(f"hop.scenario.yaml:9: checks[0].{fault}")
+
+
+@pytest.mark.parametrize("check", ["at_end", "following", "no_contact"])
+def test_a_check_with_a_default_may_be_its_name_alone(tmp_path, check):
+    assert parsed(HOP.replace("at_end: {is_armed: false}", check), tmp_path).checks[0].name_chosen == check
+
+
+@pytest.mark.parametrize(
+    ("fence", "fault"),
+    [
+        ("{}", "a fence is either a circle (circle_ne_m, radius_m) or a polygon (polygon_ne_m)"),
+        ("{keeps: out}", "a fence is either a circle"),
+        ("{radius_m: 40}", "a circle has both circle_ne_m (its middle) and radius_m"),
+        ("{circle_ne_m: [0, 0]}", "a circle has both"),
+        ("{polygon_ne_m: [[0, 0], [0, 9], [9, 0]], radius_m: 3}", "a circle has both"),
+        ("{polygon_ne_m: [[0, 0], [0, 9], [9, 0]], circle_ne_m: [0, 0], radius_m: 3}", "a fence is either a circle"),
+    ],
+)
+def test_a_fence_of_no_shape_or_two_is_refused(tmp_path, fence, fault):
+    said = fault_of(HOP.replace("takeoff: 5", f"fence: {fence}"), tmp_path)
+    assert said.startswith(f"hop.scenario.yaml:5: vehicle.script[1].fence: {fault}")
 
 
 def test_the_word_off_is_no_boolean(tmp_path):
@@ -219,7 +292,6 @@ def test_names_are_those_of_the_parts_that_do_it():
     assert set(get_args(ModeName)) == {mode.name.lower() for mode in Mode}
     assert set(Step.names()) == ACTIONS.keys()
     assert set(Check.names()) == JUDGES.keys()
-    assert set(get_args(FigureName)) == {each.name for each in fields(Scorecard) if each.type is Interval}
     assert set(WORLD_KINDS) < set(get_args(WorldName))
 
 
@@ -314,6 +386,35 @@ def refused(text, tmp_path):
             "4: vehicle.start.ne_m: is outside of the world, which ends 100 m to each side of home",
         ),
         ("world: {size_m: 50}\nvehicles:\n  - count: 50\n", "2: vehicles: the world has free ground for"),
+        (
+            "vehicle:\n  script:\n    - arm\n    - let_policy_fly: 30\n",
+            "4: vehicle.script[1].let_policy_fly: the vehicle has no policy",
+        ),
+        ("vehicle:\n  script:\n    - policy_park: 3\n", "3: vehicle.script[0].policy_park: the vehicle has no policy"),
+        (
+            "vehicle:\n  policy: {name: Navigate}\n  script:\n    - let_policy_fly: 3\n",
+            "4: vehicle.script[0].let_policy_fly: there is nobody to follow; add an owner",
+        ),
+        (
+            "vehicle:\n  script:\n    - set_param:\n        MPC_LAND_SPEED: 1\n        MPC_XY_VEL_MAXX: 3\n",
+            "5: vehicle.script[0].set_param.MPC_XY_VEL_MAXX: unknown parameter; did you mean MPC_XY_VEL_MAX?",
+        ),
+        (
+            "vehicles:\n  - {}\n  - airframe: rover\n    script:\n      - arm\n      - takeoff: 5\n",
+            "6: vehicles[1].script[1].takeoff: rover drives, and takes off never",
+        ),
+        ("checks:\n  - airspeed: {min: 5}\n", "2: checks[0].airspeed: x500 measures no airspeed, which planes do"),
+        (
+            "vehicles: [{airframe: plane}, {airframe: rover}]\nchecks:\n  - airspeed: {min: 5}\n",
+            "3: checks[0].airspeed: rover measures no airspeed",
+        ),
+        ("checks:\n  - always: speed > 1 and airspeed > 5\n", "2: checks[0].always: x500 measures no airspeed"),
+        (
+            "faults:\n  - when: airspeed > 5\n    battery: 0.1\n",
+            "2: faults[0].when: x500 measures no airspeed, which planes do",
+        ),
+        ("checks:\n  - separation: 5\n", "2: checks[0].separation: there is one vehicle"),
+        ("checks:\n  - following: {in_view_min: 0.5}\n", "2: checks[0].following: the vehicle has no policy"),
     ],
 )
 def test_what_cannot_be_flown_is_refused_before_with_its_place(tmp_path, text, said):
@@ -333,6 +434,8 @@ def test_what_cannot_be_flown_is_refused_before_with_its_place(tmp_path, text, s
         "vehicles: [{start: {ne_m: [5, 5]}}, {start: {ne_m: [5, 6]}}]\nworld: {size_m: 50}\n" + AT_REST,
         "vehicle: {start: {ne_m: [100, -100]}}\nworld: {size_m: 200}\n" + AT_REST,
         "checks: [{altitude: {min: 5, max: 5}}]\n",
+        "vehicles: [{airframe: plane}, {airframe: rover}]\nchecks: [{airspeed: {min: 5}, vehicle: 1}]\n",
+        "vehicle: {airframe: rover, script: [{takeoff: 5}]}\nfails_with: takeoff\n",
     ],
 )
 def test_what_can_be_flown_is_not_refused(tmp_path, text):
@@ -380,3 +483,17 @@ def test_a_kept_scenario_needs_no_file_of_where_it_came_from(tmp_path):
     check_scenario(again, "own")
     assert again.seeds == (3,)
     assert Path(again.vehicle.airframe) == kept / "mine.toml"
+
+
+def test_kept_files_of_one_name_stay_apart(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "hop.py").write_text(f"async def hop(drone): '{name}'\n")
+    scenario = tmp_path / "two.scenario.yaml"
+    scenario.write_text("vehicles: [{python: 'a/hop.py:hop'}, {python: 'b/hop.py:hop'}, {python: 'a/hop.py:hop'}]\n")
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    keep_scenario(kept, read_scenario(scenario), 3)
+    files = [Path(vehicle.python.removesuffix(":hop")) for vehicle in read_scenario(kept / "two.scenario.yaml").fleet]
+    assert ["'a'" in file.read_text() for file in files] == [True, False, True]
+    assert {file.parent for file in files} == {kept}

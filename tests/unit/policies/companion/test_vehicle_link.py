@@ -108,3 +108,42 @@ def test_telemetry_that_is_no_number_changes_nothing(vehicle, value):
     tell(end, link, "LOCAL_POSITION_NED", x=value)
     tell(end, link, "LOCAL_POSITION_NED", vz=value)
     assert reported == (link.own.pos_ned, link.own.vel_ned, link.own.q_ned_from_frd, link.own.omega_frd)
+
+
+def test_a_failsafe_is_known_by_the_heartbeat_that_brings_its_mode(vehicle):
+    end, link = vehicle
+    land = {"autopilot": int(PX4.autopilot), "custom_mode": PX4.custom_mode(Mode.LAND), "base_mode": 128}
+    tell(end, link, "HEARTBEAT", **land, system_status=5)
+    assert (link.own.mode, link.own.is_failsafe) == (Mode.LAND, True)
+    tell(end, link, "HEARTBEAT", **land, system_status=4)
+    assert not link.own.is_failsafe
+
+
+@pytest.mark.parametrize(
+    ("landed_state", "is_on_ground", "is_landing"), [(1, True, False), (2, False, False), (4, True, True)]
+)
+def test_who_lands_is_not_down_yet(vehicle, landed_state, is_on_ground, is_landing):
+    end, link = vehicle
+    tell(end, link, "EXTENDED_SYS_STATE", landed_state=landed_state)
+    assert (link.own.is_on_ground, link.own.is_landing) == (is_on_ground, is_landing)
+
+
+def test_health_battery_and_emergencies_are_heard(vehicle):
+    end, link = vehicle
+    tell(end, link, "SYS_STATUS", onboard_control_sensors_health=0b101)
+    tell(end, link, "BATTERY_STATUS", charge_state=1)
+    assert (link.own.health, link.own.is_battery_low) == (0b101, False)
+    tell(end, link, "BATTERY_STATUS", charge_state=2)
+    assert link.own.is_battery_low
+    tell(end, link, "STATUSTEXT", severity=2, text="Position lost: land")
+    assert link.own.alarm_us < 0
+    tell(end, link, "STATUSTEXT", severity=0, text="Motor failure")
+    assert link.own.alarm_us == 0
+
+
+def test_home_is_asked_for_by_the_vehicles_own_return(vehicle):
+    end, link = vehicle
+    end.receive()
+    link.ask_for(Wish.RETURN)
+    answer(end, link, 0)
+    assert link.own.mode is Mode.RETURN

@@ -50,22 +50,6 @@ def test_it_lets_fly_towards_somebody_far_enough_and_stops_when_they_are_gone(sc
     assert guard.stance is Stance.SEARCH
 
 
-def test_without_a_phone_a_search_looks_where_the_owner_went_then_all_round(scene: tuple[Guard, Own, Sees]) -> None:
-    guard, own, sees = scene
-    flown(guard, own, 1.0)
-    sees.is_there = False
-    flown(guard, own, 6.0)
-    turns = []
-    for _ in range(200):
-        flown(guard, own, 0.1)
-        turns.append(guard.filtered(((0.0, 0.0, 0.0), 0.0), own)[1])
-    ahead, later = np.array(turns[:110]), turns[140:]
-    assert ahead.max() > 0.8
-    assert ahead.min() < -0.8
-    assert abs(ahead.mean()) < 0.2
-    assert later == [guard.settings.search_yaw_rate] * len(later)
-
-
 def test_a_larger_distance_to_the_owner_is_kept(scene: tuple[Guard, Own, Sees]) -> None:
     guard, own, sees = scene
     near = flown(guard, own, 1.0)[-1]

@@ -127,3 +127,13 @@ def test_depth_told_from_colours_leaves_people_out_but_does_not_look_through_the
     free_m, known_m = way_m(seen, HERE, NORTH)
     assert known_m > 9.0
     assert free_m == pytest.approx(3.0, abs=2.5 * CELL_M)
+
+
+def test_what_hangs_over_a_place_is_remembered_for_whoever_asks_for_longer() -> None:
+    seen = LocalMap()
+    seen.see(picture(2.0), POSE, None, 0)
+    there = (HERE[0] + 2.0, *HERE[1:])
+    assert seen.room_up_m(there, 0) < 2.0
+    assert seen.room_up_m(there, 60_000_000) == float("inf")
+    assert seen.room_up_m(there, 60_000_000, 600_000_000) < 2.0
+    assert seen.room_up_m(HERE, 60_000_000, 600_000_000) == float("inf")
