@@ -15,7 +15,7 @@ from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import CheckpointError, find_policy
 
 P = TypeVar("P", bound=VectorPilot)
-_OF_THE_TASK = ("drives", "shown_m", "arrived_m")
+_OF_THE_TASK = ("task", "drives", "shown_m", "arrived_m")
 
 
 def goal_pilot(name: str, kind: type[P], stack: int) -> P:

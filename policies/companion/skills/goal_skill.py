@@ -108,13 +108,13 @@ class GoalSkill:
 
     @property
     def record_layout(self) -> Layout:
-        return replace(type(self._pilot).task, stack=1)
+        return replace(self._pilot.task, stack=1)
 
     def keep_records(self) -> None:
         """Has nothing to make ready."""
 
     def recorded_frame(self, own: Own, flown: Velocity, time_us: int, *, is_flying: bool) -> Floats:  # noqa: ARG002
-        return self.seen[-type(self._pilot).task.frame_size :]
+        return self.seen[-self._pilot.task.frame_size :]
 
     def recorded_image(self) -> NDArray[np.uint8] | None:
         return None

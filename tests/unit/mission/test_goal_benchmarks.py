@@ -111,6 +111,17 @@ class FullThrottleOfTheTask(FullThrottle):
 def test_a_class_of_ones_own_flies_with_what_the_task_says_where_it_does_not():
     made = goal_pilot(f"{__name__}:StraightOn", NavigationPilot, 2)
     assert (made.stack, made.drives, made.arrived_m) == (2, False, NavigationPilot.arrived_m)
+    assert made.task == NavigationPilot.task
+
+
+def test_a_flight_of_a_class_of_ones_own_is_recorded_too(tmp_path):
+    pilot, kept = goal_pilot(f"{__name__}:FullThrottle", DrivingPilot, 2), KeptFlight(tmp_path, "mine")
+    parked(pilot, parking.CONDITIONS["calm"], 500_000, GuardSettings(), kept)
+    words = ["dataset", "build", str(tmp_path), "--task", "Drive", "--env-args", "preset=park"]
+    built = CliRunner().invoke(app, [*words, "-o", str(tmp_path / "set")])
+    assert built.exit_code == 0, built.output
+    with DatasetReader(tmp_path / "set") as reader:
+        assert {reader.episode(k).context["pilot"] for k in range(reader.count)} == {"mine"}
 
 
 @pytest.mark.parametrize(("task", "kind"), [("Navigate", NavigationPilot), ("Drive", DrivingPilot)])
