@@ -78,7 +78,7 @@ class GuardSettings(BaseModel):
     """Above the ground, where it waits and searches: over people, under crowns ..."""
     search_among_height_m: float = Field(default=2.9, gt=0.0, le=100.0)
     """... and where others were met: so far over their heads that they are no obstacle."""
-    search_yaw_rate: float = Field(default=0.6, gt=0.0, le=3.0)
+    search_yaw_rate: float = Field(default=1.2, gt=0.0, le=3.0)
     """[rad/s] on the spot."""
     image_slow_s: float = Field(default=0.55, gt=0.0, le=IMAGES_S)
     """From this age of the picture on it becomes slower ..."""
