@@ -2,7 +2,8 @@
 
 In: a `WorldConfig`, and per world a seed and `WorldParams` that a task may rewrite before it grows a world. Out: the
 `World` rows that kernels read, and a `WorldMap` of any of them for the host. The size of the map, its grid and the
-octaves are the same for all. These worlds have the character of `build_world`'s, not its bytes.
+octaves are the same for all, and so is the ground if a heightmap is given. These worlds have the character of
+`build_world`'s, not its bytes.
 """
 
 from math import ceil, sqrt
@@ -14,6 +15,7 @@ import warp as wp
 from common.warp_start import start_warp
 from sim.world.boxes import Box, Boxes, BoxesMap
 from sim.world.building import build, most_boxes
+from sim.world.custom.heightmap import heightmap_terrain
 from sim.world.custom.solid_parts import SolidPart, solid_parts
 from sim.world.custom.solids import SolidsMap
 from sim.world.custom.world_file import WorldFile
@@ -29,7 +31,7 @@ from sim.world.growing import (
     plant,
     settle,
 )
-from sim.world.hills import find_highest, raise_noise, shape_hills
+from sim.world.hills import find_highest, keep_ground, raise_noise, shape_hills
 from sim.world.terrain import Terrain, TerrainMap
 from sim.world.trees import (
     BUCKET_M,
@@ -42,7 +44,7 @@ from sim.world.trees import (
     Tree,
 )
 from sim.world.walls import WallsMap
-from sim.world.world import World, WorldConfig, WorldMap
+from sim.world.world import World, WorldConfig, WorldMap, edge_max_m
 
 wp.set_module_options({"enable_backward": False})
 
@@ -59,11 +61,14 @@ class WorldBatch:
     higher trees or for more boxes than the limits gets the limit; no array is ever overrun.
 
     Args:
-        config: size, grid and octaves of all worlds, and the numbers each begins with; its seed is not used.
+        config: size, grid, octaves and heightmap of all worlds, and the numbers each begins with; its seed is not used.
         count: how many worlds.
         device: a Warp device.
         trees_per_ha_max: highest density that a world's numbers may ask for, None: the configuration's.
         tree_height_limit_m: highest tree that they may ask for [m], None: the configuration's.
+
+    Raises:
+        WorldError: a file that a `WorldFile` names cannot be used.
     """
 
     def __init__(
@@ -76,6 +81,10 @@ class WorldBatch:
         tree_height_limit_m: float | None = None,
     ) -> None:
         start_warp()
+        self._ground = _ground_of(config)
+        if self._ground is not None:
+            size_m = self._ground.size_m
+            config = config.model_copy(update={"size_m": size_m, "cell_m": size_m / self._ground.cells})
         self.config = config
         self.count = count
         self.device = device
@@ -84,7 +93,7 @@ class WorldBatch:
         growing.trees_per_ha_max = config.trees_per_ha if trees_per_ha_max is None else trees_per_ha_max
         growing.tree_height_limit_m = config.tree_height_max_m if tree_height_limit_m is None else tree_height_limit_m
         self._growing = growing
-        self.solids = SolidsMap(_parts(config))
+        self.solids = SolidsMap(_parts(config, self._ground))
         self._make_worlds()
         self._make_scratch()
         self._commands: list[Any] = []
@@ -130,7 +139,7 @@ class WorldBatch:
         params = {name: row[name].item() for name in _FIELDS} | {"has_walls": bool(row["has_walls"])}
         seed = int(growing.seeds.numpy()[i_world]) % 2**32
         world = growing.worlds.numpy()[i_world]
-        heights = self._heights[i_world].numpy().copy()
+        heights = self._heights[i_world if self._ground is None else 0].numpy().copy()
         heights.setflags(write=False)
         terrain = TerrainMap(heights, size_m)
         forest = ForestMap(self._trees[i_world].numpy()[: int(world["forest"]["tree_count"])].copy(), size_m)
@@ -151,7 +160,10 @@ class WorldBatch:
         cells = max(2, round(config.size_m / config.cell_m))
         buckets = max(1, ceil(config.size_m / BUCKET_M))
         most_trees, most_entries = _room(config.size_m, growing.trees_per_ha_max, growing.tree_height_limit_m)
-        self._heights = self._zeros((self.count, cells + 1, cells + 1), wp.float32)
+        if self._ground is None:
+            self._heights = self._zeros((self.count, cells + 1, cells + 1), wp.float32)
+        else:  # one for all
+            self._heights = wp.array(self._ground.heights[None], dtype=wp.float32, device=self.device)
         self._trees = self._zeros((self.count, most_trees), Tree)
         self._bucket_start = self._zeros((self.count, buckets * buckets + 1), wp.int32)
         self._bucket_trees = self._zeros((self.count, most_entries), wp.int32)
@@ -162,7 +174,7 @@ class WorldBatch:
         worlds = []
         for i_world in range(self.count):
             terrain = Terrain()
-            terrain.heights = self._heights[i_world]
+            terrain.heights = self._heights[i_world if self._ground is None else 0]
             terrain.cells = cells
             terrain.cells_per_m = cells / config.size_m
             terrain.half_size_m = 0.5 * config.size_m
@@ -209,9 +221,11 @@ class WorldBatch:
         groups = 1 if growing.seeds.device.is_cpu else min(self.count, _GROUPS)
         rows = self._heights.shape[1]
         positions = ceil(growing.most_cells / 3)
-        launches: list[tuple[Any, tuple[int, ...], list[Any]]] = [
-            (kernel, (groups, rows), []) for kernel in (raise_noise, find_highest, shape_hills)
-        ]
+        launches: list[tuple[Any, tuple[int, ...], list[Any]]]
+        if self._ground is None:
+            launches = [(kernel, (groups, rows), []) for kernel in (raise_noise, find_highest, shape_hills)]
+        else:
+            launches = [(keep_ground, (groups,), [float(self._ground.heights.max()), edge_max_m(self._ground)])]
         launches += [(plant, (groups, positions, positions), [visit]) for visit in range(ROUNDS * PHASES)]
         launches.append((settle, (groups,), []))
         if self._has_boxes:
@@ -232,13 +246,18 @@ def grown_world(config: WorldConfig, seed: int, device: str = "cpu") -> WorldMap
     return batch.map(0)
 
 
-def _parts(config: WorldConfig) -> tuple[SolidPart, ...]:
-    """What stands in every world of a batch: its positions without a height are on the home plane."""
+def _ground_of(config: WorldConfig) -> TerrainMap | None:
+    """The ground of a heightmap; None: it is grown."""
+    if not isinstance(config, WorldFile) or config.heightmap is None:
+        return None
+    return heightmap_terrain(config.heightmap)
+
+
+def _parts(config: WorldConfig, ground: TerrainMap | None) -> tuple[SolidPart, ...]:
+    """What stands in every world of a batch; positions without a height are on the home plane where ground is grown."""
     if not isinstance(config, WorldFile):
         return ()
-    if config.heightmap is not None:
-        raise ValueError("worlds that are grown in batches make their own ground: leave the heightmap out")
-    return solid_parts(config, TerrainMap(np.zeros((3, 3), np.float32), config.size_m))
+    return solid_parts(config, ground or TerrainMap(np.zeros((3, 3), np.float32), config.size_m))
 
 
 def _spacing_m(trees_per_ha: float) -> float:

@@ -138,3 +138,13 @@ def shape_hills(growing: Growing, groups: int) -> None:
                 edge_max = wp.max(edge_max, height)
         wp.atomic_max(growing.ground_max_m, i_world, row_max)
         wp.atomic_max(growing.edge_max_m, i_world, edge_max)
+
+
+@wp.kernel(enable_backward=False)
+def keep_ground(growing: Growing, groups: int, ground_max_m: float, edge_max_m: float) -> None:
+    """How high the ground of the chosen worlds reaches, and along the edges of the map; it is the same for all."""
+    group = wp.tid()
+    for slot in range(group, growing.chosen_count[0], groups):
+        i_world = growing.chosen[slot]
+        growing.ground_max_m[i_world] = ground_max_m
+        growing.edge_max_m[i_world] = edge_max_m

@@ -241,9 +241,7 @@ def build_world(config: WorldConfig | None = None, device: str = "cpu") -> World
         max(config.clearing_radius_m, config.treeless_radius_m),
     )
     forest = ForestMap(trees, terrain.size_m)
-    heights = terrain.heights
-    edges = np.concatenate([heights[0], heights[-1], heights[:, 0], heights[:, -1]])
-    walls = WallsMap(config.has_walls, 0.5 * terrain.size_m, float(edges.max()) + config.wall_height_m)
+    walls = WallsMap(config.has_walls, 0.5 * terrain.size_m, edge_max_m(terrain) + config.wall_height_m)
     boxes = BoxesMap(no_boxes())
     solids = SolidsMap(solid_parts(config, terrain) if isinstance(config, WorldFile) else ())
     kernel = World()
@@ -253,6 +251,12 @@ def build_world(config: WorldConfig | None = None, device: str = "cpu") -> World
     kernel.boxes = boxes.kernel(device)
     kernel.solids = solids.kernel(device)
     return WorldMap(config, terrain, forest, walls, kernel, boxes, solids)
+
+
+def edge_max_m(terrain: TerrainMap) -> float:
+    """Height of the highest ground at the edges of the map [m]."""
+    heights = terrain.heights
+    return float(np.concatenate([heights[0], heights[-1], heights[:, 0], heights[:, -1]]).max())
 
 
 def _terrain(config: WorldConfig) -> TerrainMap:

@@ -3,6 +3,8 @@ import pytest
 import warp as wp
 
 from sim.world.batch import WorldBatch, grown_world
+from sim.world.custom.heightmap import write_heightmap
+from sim.world.custom.world_file import BoxSolid, WorldFile
 from sim.world.growing import COVERAGE
 from sim.world.trees import CROWN_RADIUS_FRACTION, EDGE_M
 from sim.world.world import WorldConfig, build_world
@@ -235,3 +237,33 @@ def test_a_batch_has_as_many_octaves_as_its_configuration():
     roughness = [np.abs(np.diff(h, n=2, axis=0)).mean() for h in (smooth, rough)]
     assert roughness[1] > 2.0 * roughness[0]
     assert np.corrcoef(smooth.ravel(), rough.ravel())[0, 1] > 0.8
+
+
+def test_worlds_with_a_heightmap_have_its_ground_and_trees_of_their_own(tmp_path):
+    """As one that is built of it alone: points, rays and contact; walls too."""
+    file = tmp_path / "hills.png"
+    png, heightmap = write_heightmap(build_world(CONFIG).terrain)
+    file.write_bytes(png)
+    config = WorldFile(
+        heightmap=heightmap.model_copy(update={"file": file}),
+        trees_per_ha=100.0,
+        has_walls=True,
+        boxes=[BoxSolid(position_ned_m=(20.0, 10.0), size_m=(4.0, 4.0, 3.0))],
+    )
+    batch = WorldBatch(config, 2)
+    batch.grow_all(1)
+    one = build_world(config.model_copy(update={"trees_per_ha": 0.0}))
+    for i_world in range(2):
+        assert batch.map(i_world).heights.tobytes() == one.heights.tobytes()
+    assert batch.map(0).trees.tobytes() != batch.map(1).trees.tobytes()
+    roots = batch.map(0).trees
+    assert len(roots) > 50
+    bare = WorldBatch(config.model_copy(update={"trees_per_ha": 0.0}), 2)
+    bare.grow_all(1)
+    rng = np.random.default_rng(1)
+    pos = np.column_stack([rng.uniform(-120.0, 120.0, (500, 2)), rng.uniform(-12.0, 2.0, 500)])
+    for of_batch, of_one in zip(query_points((bare, 1), pos), query_points(one, pos), strict=True):
+        np.testing.assert_array_equal(of_batch, of_one)
+    dirs = rng.normal(size=(500, 3))
+    dirs /= np.linalg.norm(dirs, axis=1, keepdims=True)
+    np.testing.assert_array_equal(query_rays((bare, 1), pos, dirs, 60.0), query_rays(one, pos, dirs, 60.0))
