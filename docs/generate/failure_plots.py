@@ -18,13 +18,14 @@ from mission.follow.lockstep import flight_with_companion, follow_for
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.names import FOLLOWER
 from policies.companion.skills.load_skill import load_follower
+from policies.tasks.follow_me.track import Ranges
+from policies.tasks.follow_me.tracked.keep_off import SLOW_S
 
 PLOT = Path(__file__).parents[1] / "results" / "images" / "failures.png"
 FLIGHTS = (("silent", 3900671), ("crossed", 3900713), ("run", 3900665))
 SHOWN_S = 16.0  # about the moment
-BAND_M = (1.0, 3.0)
 MARKS_S = 4.0
-UNSEEN_S = 0.7  # as the guard counts
+BAND = Ranges()
 
 
 @dataclass
@@ -71,7 +72,7 @@ def moment(seen: Seen) -> int:
         return len(seen.vehicle) - 1
     longest = run = last = 0
     for k, far_m in enumerate(seen.distance_m):
-        run = 0 if BAND_M[0] <= far_m <= BAND_M[1] else run + 1
+        run = 0 if BAND.near_m <= far_m <= BAND.far_m else run + 1
         if run > longest:
             longest, last = run, k
     return last
@@ -103,8 +104,8 @@ def draw(seen: Seen, above: Any, below: Any) -> None:
     above.title.set_fontsize("medium")
     above.legend(loc="best", fontsize="small")
     time_s = 0.1 * np.arange(first, last + 1)
-    below.axhspan(*BAND_M, color="tab:green", alpha=0.15, linewidth=0.0)
-    unseen = np.array(seen.silence_s)[shown] > UNSEEN_S
+    below.axhspan(BAND.near_m, BAND.far_m, color="tab:green", alpha=0.15, linewidth=0.0)
+    unseen = np.array(seen.silence_s)[shown] > SLOW_S
     below.fill_between(
         time_s, 0.0, 1.0, where=unseen, transform=below.get_xaxis_transform(), color="tab:gray", alpha=0.3
     )

@@ -33,7 +33,7 @@ def signals_interrupt() -> Iterator[None]:
 
     def swallowed(lost: "UnraisableHookArgs") -> None:
         if issubclass(lost.exc_type, KeyboardInterrupt):
-            Timer(_AGAIN_S, interrupt_main).start()
+            Timer(_AGAIN_S, interrupt_main, [signal.SIGTERM]).start()  # SIGINT may be ignored
         else:
             hook(lost)
 

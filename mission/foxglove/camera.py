@@ -103,7 +103,8 @@ class FlightCamera:
         byte = frame.pixels[..., 3].astype(np.float32)
         depth_m = np.where(byte < NO_RETURN, frame.depth_half_m * byte / np.maximum(NO_RETURN - byte, 1.0), np.inf)
         q = self._onboard.q_frd_from_rdf
-        self._new = Shot(frame.time_us, frame.pixels[..., :3], depth_m.astype(np.float32), frame.hfov_deg, q)
+        time_us = frame.time_us + self._flight.controller.state.boot_us  # of the flight
+        self._new = Shot(time_us, frame.pixels[..., :3], depth_m.astype(np.float32), frame.hfov_deg, q)
 
 
 def is_heard(channels: ChannelSet) -> bool:

@@ -190,7 +190,7 @@ def _judged(run: DecisionRows, judge: Judge, truth: TruthRows | None) -> _Judged
 
 
 def _stay(judged: _Judged, reached: Rows) -> tuple[int, Rows]:
-    """For how many decisions it has no other goal than those that it has reached, and the last of these.
+    """For how many decisions it has no other goal, level, than those that it has reached, and the last of these.
 
     A goal that walks is another one each time; where the vehicle keeps up with it, it has reached that, too.
     """
@@ -198,7 +198,7 @@ def _stay(judged: _Judged, reached: Rows) -> tuple[int, Rows]:
         goal = judged.run.goal[k]
         if outcome == Outcome.SUCCESS:
             reached = goal
-        elif (goal != reached).any():
+        elif (goal[:2] != reached[:2]).any():  # one without a height of its own has the vehicle's
             return k, reached
     return len(judged.run), reached
 

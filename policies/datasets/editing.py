@@ -62,8 +62,11 @@ def _merged(origins: Sequence[DatasetOrigin]) -> DatasetOrigin:
     rewards_by = "+".join(sorted({origin.rewards_by for origin in origins}))
     notes = {name: text for origin in origins for name, text in origin.notes.items()}
     for name in sorted({name for each in origins[1:] for name in differing_settings(first.settings, each.settings)}):
-        values = dict.fromkeys(str(origin.settings[name]) for origin in origins if name in origin.settings)
-        notes[f"setting {name}"] = ", ".join(values)
+        note, values = f"setting {name}", dict[str, None]()
+        for origin in origins:
+            here = origin.notes[note].split(", ") if note in origin.notes else [str(origin.settings.get(name, ""))]
+            values |= dict.fromkeys(here)
+        notes[note] = ", ".join(filter(None, values))
     return replace(first, pilot=pilots, rewards_by=rewards_by, notes=notes)
 
 

@@ -150,6 +150,14 @@ def test_conditions_may_differ_and_are_noted(tmp_path):
         assert reader.origin.notes == {"from": "here", "by": "hand", "setting has_estimator": "True, False"}
 
 
+def test_a_merged_set_that_is_merged_again_keeps_what_it_was_made_of(tmp_path):
+    parts = [written(tmp_path / name, split=name) for name in ("train", "test", "validation")]
+    merge(parts[:2], tmp_path / "two")
+    merge([tmp_path / "two", parts[2]], tmp_path / "three")
+    with DatasetReader(tmp_path / "three") as reader:
+        assert reader.origin.notes == {"setting split": "train, test, validation"}
+
+
 def test_a_filter_keeps_what_passes_and_refuses_to_keep_nothing(tmp_path):
     whole = written(tmp_path / "whole", range(5))
     assert keep(whole, tmp_path / "good", lambda each: each.is_success) == 3
