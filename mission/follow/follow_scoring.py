@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from autopilot.interface.vehicle_state import Mode
 from mission.flight_base import FlightBase
-from policies.companion.engagement import Phase
+from policies.companion.engagement import Engagement
 from policies.tasks.follow_me.measuring import COLUMNS, measure_rows
 from policies.tasks.follow_me.observe import DECISION_S, HFOV_DEG, IMAGE_SIZE
 from policies.tasks.follow_me.track import Ranges, Track
@@ -27,15 +27,14 @@ VISIBLE_M = STATURE_M * IMAGE_SIZE / (PIXELS_LEAST * 2.0 * tan(radians(0.5 * HFO
 """Farther away a person is less than two pixels high: a policy cannot tell them from a trunk (guess)."""
 _SAMPLE_US = round(DECISION_S * 1e6)
 _BEFORE = (Mode.TAKEOFF, Mode.HOLD)  # on the way to being followed
-_OWN = (Phase.HANDING_BACK, Phase.REGAINING, Phase.ENGAGING)  # in which the mode is the companion's
 
 
-def taken_over(flight: FlightBase, phase: Phase, *, has_begun: bool, is_put_back: bool) -> str:
+def taken_over(flight: FlightBase, engagement: Engagement, *, has_begun: bool, is_put_back: bool) -> str:
     """Why it is a person who has the vehicle now; "" if the policy has it, or has given it up by itself.
 
     Args:
         flight: with a companion.
-        phase: of the companion.
+        engagement: of the companion.
         has_begun: it has followed before.
         is_put_back: it was restarted, and has not followed since.
     """
@@ -45,7 +44,7 @@ def taken_over(flight: FlightBase, phase: Phase, *, has_begun: bool, is_put_back
         return "the vehicle was restarted"
     state = flight.controller.state
     is_offboard = flight.controller.modes[state.mode].is_offboard
-    is_own = is_offboard or phase in _OWN or (state.mode in _BEFORE and not has_begun)
+    is_own = is_offboard or engagement.has_chosen or (state.mode in _BEFORE and not has_begun)
     if is_own or state.is_failsafe or not state.is_armed:
         return ""
     return f"mode {state.mode.name.replace('_', ' ').title()} was chosen"

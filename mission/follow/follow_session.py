@@ -195,7 +195,7 @@ def watch_of(flight: FlightBase, companion: Companion, seconds: float) -> Follow
         if companion.phase is Phase.FLYING and flight.controller.state.is_armed:
             restarts_over = flight.restart_count
         is_put_back = flight.restart_count > restarts_over
-        return taken_over(flight, companion.phase, has_begun=has_begun, is_put_back=is_put_back)
+        return taken_over(flight, companion.engagement, has_begun=has_begun, is_put_back=is_put_back)
 
     return FollowWatch(flight, lambda: companion.phase is Phase.FLYING, seconds, taken)
 

@@ -16,6 +16,7 @@ from common.attitude import Vector
 
 PROVEN_US = 1_500_000  # a failsafe that is the lost position's is followed by its silence so soon; guess
 CATCH_US = 300_000  # so long there must be a position before the descent is stopped: a tenth of the way down; guess
+CATCH_HEARD_US = 1_200_000  # and so lately it must have said that it lands: heartbeats come at 1 Hz
 CATCH_LEAST_M = 0.7  # above the ground: it sinks on for 0.3 m, and what touches the ground belongs there; guess
 STEADY_US = 3_000_000  # and so long before it follows again
 SETTLED_US = 5_000_000  # after which it stands in Hold,
@@ -45,6 +46,7 @@ class Condition:
     """How vehicle and owner are."""
 
     mode: Mode | None = None
+    heartbeat_age_us: int = 0  # since it said so; 0: just now
     is_failsafe: bool = False  # the vehicle says so: the mode is not a pilot's
     is_heard: bool = True  # by heartbeats, and no other companion is
     is_down: bool = False  # on the ground, or without motors
@@ -92,7 +94,7 @@ class Aftermath:
         self._is_proven = now.is_unplaced or (before is not None and before.is_unplaced)
         self._resumes_until_us = time_us + self._resume_us if is_unplaced and self._resume_us else 0
         self._steady_us = time_us
-        if _is_falling(now) and self._resumes_until_us:
+        if is_falling(now) and self._resumes_until_us:
             self._begin(Right.FALLEN, time_us, now)
         elif before is not None and now.mode in HOLDING and (before.is_lost or self._resumes_until_us):
             self._begin(Right.HELD, time_us, now)
@@ -104,6 +106,10 @@ class Aftermath:
     def catch(self) -> None:
         """Hold is asked for: it is the companion's, if it comes."""
         self.is_catching = True
+
+    def give_up_catch(self) -> None:
+        """It is asked for no more: who chooses Hold now is a pilot."""
+        self.is_catching = False
 
     def asked(self) -> None:
         """Offboard is asked for: once."""
@@ -135,7 +141,8 @@ class Aftermath:
         steady_us = time_us - self._steady_us
         if self.right is Right.FALLEN:
             is_high = now.height_m >= CATCH_LEAST_M  # not where it is not known
-            return Due.CATCH if self._is_proven and steady_us >= CATCH_US and is_high else Due.NONE
+            is_fresh = now.heartbeat_age_us <= CATCH_HEARD_US
+            return Due.CATCH if self._is_proven and steady_us >= CATCH_US and is_high and is_fresh else Due.NONE
         if self.right is Right.NONE:
             return Due.NONE
         if self.may_resume(time_us) and self._is_proven and steady_us >= STEADY_US and not now.is_alone:
@@ -147,13 +154,13 @@ class Aftermath:
         self._is_proven |= now.is_unplaced
         if now.mode in HOLDING and (self.is_catching or now.is_failsafe):
             self._begin(Right.HELD, time_us, now)
-        elif not _is_falling(now) or not self.may_resume(time_us):
+        elif not is_falling(now) or not self.may_resume(time_us):
             self.end()
         elif not self._is_proven and time_us - self._since_us > PROVEN_US:
             self.end()  # it lands for another reason
 
     def _look_held(self, time_us: int, now: Condition) -> None:
-        if _is_falling(now) and self.may_resume(time_us):
+        if is_falling(now) and self.may_resume(time_us):
             self._is_proven = self.is_catching = False
             self._begin(Right.FALLEN, time_us, now)
         elif now.mode is not self._mode or self._is_moved(time_us, now):
@@ -174,6 +181,6 @@ class Aftermath:
         self._alone_us, self._stood_ned = time_us, None
 
 
-def _is_falling(now: Condition) -> bool:
+def is_falling(now: Condition) -> bool:
     """Whether it lands, and no pilot has said so."""
     return now.mode is Mode.LAND and now.is_failsafe

@@ -38,7 +38,7 @@ class Companion:
     Args:
         link: bytes to and from the vehicle.
         skill: what it can do, and who decides.
-        is_told: engage as soon as everything is there; otherwise the pilot chooses Offboard.
+        is_reported: engage as soon as everything is there; otherwise the pilot chooses Offboard.
         is_by_sticks: what drives is driven by MANUAL_CONTROL in mode Position, and not in Offboard.
         wall_s: a clock in seconds that the latency is measured with; none: it is not measured.
     """
@@ -198,6 +198,7 @@ class Companion:
         has_attitude = time_us - own.attitude_us <= TELEMETRY_OLD_US
         return Condition(
             mode=own.mode,
+            heartbeat_age_us=time_us - own.heartbeat_us,
             is_failsafe=own.is_failsafe,
             is_heard=time_us - own.heartbeat_us <= HEARTBEAT_OLD_US < time_us - self.vehicle.other_us,
             is_down=not own.is_armed or (own.is_on_ground and not own.is_landing),

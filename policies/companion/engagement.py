@@ -6,11 +6,11 @@ companion never takes back what has been taken from it, and flies again only whe
 itself where no pilot has taken anything is in aftermath.py.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from autopilot.interface.vehicle_state import Mode
-from policies.companion.aftermath import Aftermath, Condition, Due, Right
+from policies.companion.aftermath import Aftermath, Condition, Due, Right, is_falling
 
 ASK_AGAIN_US = 500_000  # a mode that has not come is asked for again
 ENGAGE_PATIENCE_US = 3_000_000  # after which a change to Offboard that has not come has failed
@@ -32,6 +32,9 @@ class Phase(Enum):
     RELEASED = "released"  # control has gone to somebody else; sends nothing
     REGAINING = "regaining"  # there is a position again: asks for Hold, and waits there until it may go on
     RETURNING = "returning"  # nobody is there to be followed, and asks for Return
+
+
+_CHOOSING = (Phase.HANDING_BACK, Phase.REGAINING, Phase.ENGAGING, Phase.RETURNING)  # a mode is the companion's
 
 
 class Sending(Enum):
@@ -78,7 +81,7 @@ class Engagement:
     """The state machine.
 
     Args:
-        is_told: to engage as soon as everything is there and the vehicle holds in the air; once.
+        is_reported: to engage as soon as everything is there and the vehicle holds in the air; once.
         ready: what it could do, for the pilot to read.
         flying: what it does.
         aftermath: what it may do by itself; None: nothing.
@@ -96,6 +99,7 @@ class Engagement:
         self.phase = Phase.WAITING
         self._aftermath = aftermath or Aftermath(0.0, 0.0)
         self._before = Condition()  # when it began to hand back
+        self._own_mode: Mode | None = None  # that the companion has brought about, for as long as it lasts
         self._is_reported = is_reported
         self._since_us = 0  # when this phase began
         self._asked_us = 0  # when a mode was last asked for
@@ -107,11 +111,24 @@ class Engagement:
         if self.phase is Phase.RELEASED:
             self.phase = Phase.WAITING
 
+    @property
+    def has_chosen(self) -> bool:
+        """Whether the vehicle is in its mode by the companion, or by the failsafe that it watches, and by no pilot."""
+        return self.phase in _CHOOSING or self._aftermath.right is not Right.NONE or self._own_mode is not None
+
     def step(self, now: Situation) -> Orders:
         """Takes the next step; at most one change of phase."""
+        orders = self._step(now)
+        may_go_on = self._aftermath.may_resume(now.time_us) and now.condition.is_well
+        if is_falling(now.condition) and not may_go_on:  # PX4 goes back to Offboard by itself, if setpoints come
+            return replace(orders, sending=Sending.NOTHING)
+        return orders
+
+    def _step(self, now: Situation) -> Orders:
         is_chosen = now.is_offboard and not self._was_offboard  # the pilot has just switched to Offboard
         self._was_offboard = now.is_offboard
         text = self._aftermath.look(now.time_us, now.condition)
+        self._note_mode(now.condition.mode)
         if text:
             return Orders(text=text)
         if self.phase in (Phase.WAITING, Phase.READY, Phase.RELEASED) and not now.is_offboard:
@@ -136,6 +153,14 @@ class Engagement:
             case Phase.RETURNING:
                 return self._returning(now, is_chosen)
 
+    def _note_mode(self, mode: Mode | None) -> None:
+        """Keeps in mind whose the vehicle's mode is."""
+        is_sent_home = self.phase is Phase.RETURNING and mode is Mode.RETURN
+        if is_sent_home or self._aftermath.right is not Right.NONE:
+            self._own_mode = mode
+        elif mode is not self._own_mode:
+            self._own_mode = None
+
     def _after(self, now: Situation) -> Orders | None:
         """What it does by itself, though nobody has told it; None: nothing."""
         match self._aftermath.due(now.time_us, now.condition):
@@ -147,9 +172,9 @@ class Engagement:
             case Due.RETURN if now.condition.is_covered:
                 self._aftermath.end()
                 return Orders(_offered(now), text="Companion: owner lost, no way up: stays")
-            case Due.RETURN:
+            case Due.RETURN if _is_just_heard(now):
                 return self._ask(Phase.RETURNING, now, Wish.RETURN, "Companion: owner lost, returning")
-            case Due.NONE:
+            case _:
                 return None
 
     def _waiting(self, now: Situation, is_chosen: bool) -> Orders:
@@ -178,7 +203,7 @@ class Engagement:
             return self._go(Phase.READY, now, Sending.STAY, text=f"Companion: not engaged: mode {now.mode_name}")
         if now.is_refused or now.time_us - self._since_us > ENGAGE_PATIENCE_US:
             return self._go(Phase.READY, now, Sending.STAY, text="Companion: not engaged: Offboard was refused")
-        return self._repeat(now, Wish.OFFBOARD)
+        return self._repeat_if_heard(now, Wish.OFFBOARD)
 
     def _flying(self, now: Situation) -> Orders:
         if not now.is_offboard:
@@ -214,15 +239,17 @@ class Engagement:
             return self._stop(now)
         if aftermath.right is Right.FALLEN:
             if condition.is_unplaced or not aftermath.is_catching:  # lost again, or another failsafe
+                aftermath.give_up_catch()
                 return self._go(Phase.RELEASED, now)
             if now.time_us - self._since_us > HAND_BACK_PATIENCE_US:
                 aftermath.end()
                 return self._go(Phase.RELEASED, now, text="Companion: Hold was not taken")
-            return self._repeat(now, Wish.HOLD)
+            return self._repeat_if_heard(now, Wish.HOLD)
         if not aftermath.may_resume(now.time_us):
             why = now.trouble or ("the owner is not seen" if condition.is_alone else "the position is not steady")
             return self._go(Phase.RELEASED, now, text=f"Companion: stays in hold: {why}")
-        if aftermath.due(now.time_us, condition) is Due.RESUME and now.is_airborne and not now.trouble:
+        is_due = aftermath.due(now.time_us, condition) is Due.RESUME and _is_just_heard(now)
+        if is_due and now.is_airborne and not now.trouble:
             aftermath.asked()
             return self._ask(Phase.ENGAGING, now, Wish.OFFBOARD)
         return Orders(Sending.STAY)
@@ -237,7 +264,7 @@ class Engagement:
         if now.is_refused or now.time_us - self._since_us > RETURN_PATIENCE_US:
             self._aftermath.end()
             return self._go(Phase.RELEASED, now, text="Companion: stays in hold: Return was refused")
-        return self._repeat(now, Wish.RETURN)
+        return self._repeat_if_heard(now, Wish.RETURN)
 
     def _repeat(self, now: Situation, wish: Wish) -> Orders:
         """Asks for a mode again if that is due."""
@@ -245,6 +272,10 @@ class Engagement:
             return Orders(Sending.STAY)
         self._asked_us = now.time_us
         return Orders(Sending.STAY, wish)
+
+    def _repeat_if_heard(self, now: Situation, wish: Wish) -> Orders:
+        """The same, but not over a mode that a pilot may have chosen since the last heartbeat."""
+        return self._repeat(now, wish) if _is_just_heard(now) else Orders(Sending.STAY)
 
     def _stop(self, now: Situation) -> Orders:
         """Somebody else has control."""
@@ -261,6 +292,11 @@ class Engagement:
     def _ask(self, phase: Phase, now: Situation, wish: Wish, text: str = "") -> Orders:
         self.phase, self._since_us, self._asked_us = phase, now.time_us, now.time_us
         return Orders(Sending.STAY, wish, text)
+
+
+def _is_just_heard(now: Situation) -> bool:
+    """Whether a heartbeat has come in for this step: the mode is the vehicle's, not one of up to seconds ago."""
+    return now.condition.heartbeat_age_us == 0
 
 
 def _offered(now: Situation) -> Sending:

@@ -84,7 +84,7 @@ class Own:
     is_landing: bool = False  # and not on the ground yet
     is_failsafe: bool = False  # as its heartbeat says
     health: int | None = None  # MAV_SYS_STATUS_SENSOR of all that works; None: not known
-    is_battery_low: bool = False
+    is_battery_low: bool = False  # one of them
     alarm_us: int = NEVER_US  # when it said last that something is an emergency
     mode: Mode | None = None
     mode_name: str = "unknown"
@@ -128,6 +128,7 @@ class VehicleLink:
         self._listeners: dict[int, Listener] = {}
         self._rates_hz = {**RATES_HZ}
         self._text_id = 0
+        self._low_batteries: set[int] = set()  # their ids
         self._is_refused = False
         self._asked_for: Mode | None = None  # and not answered yet
         self._request_us = NEVER_US
@@ -288,7 +289,9 @@ class VehicleLink:
         elif name == "SYS_STATUS":
             own.health = fields.onboard_control_sensors_health
         elif name == "BATTERY_STATUS":
-            own.is_battery_low = fields.charge_state > BatteryLevel.OK
+            is_low = fields.charge_state > BatteryLevel.OK
+            (self._low_batteries.add if is_low else self._low_batteries.discard)(fields.id)
+            own.is_battery_low = bool(self._low_batteries)
         elif fields.severity <= Severity.ALERT:
             own.alarm_us = time_us
 

@@ -4,18 +4,19 @@ import pytest
 from rich.console import Console
 
 from autopilot.interface.failure_requests import Failure, Unit
+from autopilot.interface.vehicle_state import Mode
 from mission.follow.follow_session import finish, score_lines, watch_of
 from mission.run_folder import OwnFiles
 from policies.companion.engagement import Phase
 from policies.tasks.follow_me.scorecard import lines, scorecard
-from tests.unit.mission.follow.follow_flight import following, lose
+from tests.unit.mission.follow.follow_flight import following, hide, lose
 
 
 class Judged:
     """A flight that follows, and the watch that judges it from now on."""
 
-    def __init__(self, planned_s):
-        self.flight, self.companion = following(numbers={"phone_error": 0.0})
+    def __init__(self, planned_s, **changed):
+        self.flight, self.companion = following(numbers={"phone_error": 0.0}, **changed)
         self.watch = watch_of(self.flight, self.companion, planned_s)
         self.watch.frame()
 
@@ -55,6 +56,22 @@ def test_a_person_who_flies_away_and_comes_back_is_not_judged(tmp_path):
     assert track.planned_s == pytest.approx(judged.watch.judged_s, abs=0.2)
     assert 4.0 < track.planned_s < 5.2  # eight, less three and what the change of mode took
     assert judged.exit_code(tmp_path) == 0
+
+
+def test_what_the_companion_does_by_itself_after_a_failure_is_nobodys_taking_over():
+    settings = {"search_s": 2.5, "lost_s": 3.0, "return_s": 4.0}
+    judged = Judged(40.0, settings=settings)
+    judged.fly(1.0)
+    judged.flight.injector.inject(Unit.MAGNETOMETER, Failure.OFF, 0)
+    hide(judged.flight)
+    lose(judged.companion, "FOLLOW_TARGET")
+    judged.fly(5.5)
+    assert judged.flight.controller.state.mode is Mode.HOLD
+    judged.flight.injector.inject(Unit.MAGNETOMETER, Failure.OK, 0)
+    judged.fly(6.0)
+    assert judged.flight.controller.state.mode is Mode.RETURN
+    assert not judged.flight.controller.state.is_failsafe
+    assert judged.watch.takeovers == ["a failure was injected"]
 
 
 async def hold_for_3_s(drone):

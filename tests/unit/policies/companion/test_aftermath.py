@@ -3,7 +3,7 @@
 import pytest
 
 from autopilot.interface.vehicle_state import Mode
-from policies.companion.aftermath import CATCH_LEAST_M, PROVEN_US, STEADY_US, Aftermath, Condition
+from policies.companion.aftermath import CATCH_HEARD_US, CATCH_LEAST_M, PROVEN_US, STEADY_US, Aftermath, Condition
 from policies.companion.engagement import (
     HAND_BACK_PATIENCE_US,
     RETURN_PATIENCE_US,
@@ -215,9 +215,42 @@ def test_a_landing_that_a_pilot_chose_is_left_alone():
 
 
 @pytest.mark.parametrize("mode", [Mode.POSITION, Mode.ALTITUDE, Mode.HOLD, Mode.RETURN])
-def test_a_pilot_who_takes_it_out_of_the_landing_has_it(mode):
-    bench = Bench().falling().step(0.2, mode=mode, **UNPLACED)
+@pytest.mark.parametrize("is_lost_again", [False, True])
+def test_a_pilot_who_takes_it_out_of_the_landing_has_it(mode, is_lost_again):
+    bench = Bench().falling()
+    if is_lost_again:  # when Hold was asked for, and has not come
+        bench.step(0.5, **FALLING).step(0.2, **FALLING, **UNPLACED)
+        assert set(bench.wishes) == {Wish.HOLD}
+        bench.wishes.clear()
+    bench.step(0.2, mode=mode, **UNPLACED)
+    assert not bench.machine.has_chosen
     assert bench.step(10.0, **{"mode": mode} if mode is Mode.HOLD else FALLING).wishes == []
+
+
+STALE = {"heartbeat_age_us": 400_000}  # since it told its mode
+
+
+def test_home_is_asked_for_only_on_a_mode_that_was_just_heard():
+    bench = Bench().left_alone().step(RETURN_S + 1.0, **LOST, **STALE)
+    assert bench.wishes == []
+    bench.step(**LOST).step(2.0, **LOST, **STALE)
+    assert bench.wishes == [Wish.RETURN]
+    assert bench.step(**LOST).wishes == [Wish.RETURN, Wish.RETURN]
+
+
+def test_offboard_is_asked_for_only_on_a_mode_that_was_just_heard():
+    bench = Bench().caught().step(STEADY_US * 1e-6 + 1.0, **STALE)
+    assert bench.wishes == []
+    bench.step().step(2.0, **STALE)
+    assert (bench.wishes, bench.phase) == ([Wish.OFFBOARD], Phase.ENGAGING)
+    assert bench.step().wishes == [Wish.OFFBOARD, Wish.OFFBOARD]
+
+
+def test_the_descent_is_stopped_between_two_heartbeats_but_after_none_that_is_missed():
+    assert Bench().falling().step(5.0, **FALLING, heartbeat_age_us=CATCH_HEARD_US + 1).wishes == []
+    bench = Bench().falling().step(2.0, **FALLING, heartbeat_age_us=CATCH_HEARD_US)
+    assert bench.wishes == [Wish.HOLD]
+    assert bench.step(**FALLING).wishes == [Wish.HOLD, Wish.HOLD]
 
 
 def test_a_hold_of_the_failsafe_is_no_pilots():
@@ -290,6 +323,38 @@ def test_an_owner_who_was_not_found_again_by_then_is_not_waited_for_for_ever():
 
 def test_without_a_time_for_it_it_lands():
     assert Bench(resume_s=0.0).falling().step(5.0, **FALLING).wishes == []
+
+
+@pytest.mark.parametrize(("resume_s", "condition"), [(0.0, {}), (RESUME_S, {"is_well": False}), (3.0, {})])
+def test_a_landing_that_is_not_to_end_is_sent_nothing(resume_s, condition):
+    bench = Bench(resume_s=resume_s).falling().step(3.0, **FALLING, **UNPLACED)
+    bench.sent.clear()
+    bench.step(5.0, **FALLING, **condition)
+    assert bench.phase is Phase.READY
+    assert set(bench.sent) == {Sending.NOTHING}
+    assert bench.step(mode=Mode.HOLD).sent[-1] is Sending.STAY
+
+
+def test_a_landing_that_it_may_end_is_sent_setpoints_that_stay():
+    assert Bench().falling().step(1.0, **FALLING).sent[-1] is Sending.STAY
+
+
+def test_the_modes_that_it_brought_about_are_its_own_until_they_change():
+    bench = Bench().left_alone()
+    assert bench.machine.has_chosen
+    bench.step(RETURN_S + 0.1, **LOST).step(5.0, mode=Mode.RETURN, **LOST)
+    assert (bench.phase, bench.machine.has_chosen) == (Phase.WAITING, True)
+    assert not bench.step(mode=Mode.HOLD, **LOST).machine.has_chosen
+    assert not bench.step(mode=Mode.RETURN, **LOST).machine.has_chosen
+
+
+def test_hold_in_which_it_stays_is_still_its_own():
+    bench = Bench().left_alone().step(2.0 * RETURN_S, is_covered=True, **LOST)
+    assert bench.machine.has_chosen
+
+
+def test_a_pilots_hold_is_not_its_own():
+    assert not Bench().flying().step(mode=Mode.HOLD).machine.has_chosen
 
 
 def test_an_autopilot_that_goes_back_to_offboard_by_itself_is_flown():

@@ -141,6 +141,15 @@ def test_health_battery_and_emergencies_are_heard(vehicle):
     assert link.own.alarm_us == 0
 
 
+def test_any_battery_that_is_low_counts(vehicle):
+    end, link = vehicle
+    tell(end, link, "BATTERY_STATUS", id=0, charge_state=2)
+    tell(end, link, "BATTERY_STATUS", id=1, charge_state=1)
+    assert link.own.is_battery_low
+    tell(end, link, "BATTERY_STATUS", id=0, charge_state=1)
+    assert not link.own.is_battery_low
+
+
 def test_home_is_asked_for_by_the_vehicles_own_return(vehicle):
     end, link = vehicle
     end.receive()
