@@ -201,7 +201,6 @@ def test_a_fault_is_one_sentence_with_its_place(tmp_path, old, new, fault):
         ("at_end: {within_m: 3}", ".at_end: within_m: is of near, which is left out"),
         ("following: {has_collision: null}", ".following: asks for nothing: needs in_band_min,"),
         ("scorecard: {}", ".scorecard: must not be empty"),
-        ("figures: {}", ".figures: must not be empty"),
         ("scorecard: {in_view: {}}", ".scorecard.in_view: needs min, max or both"),
     ],
 )
