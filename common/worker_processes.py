@@ -60,13 +60,12 @@ class _Worker(Generic[Task, Outcome]):
         self.process.start()
         theirs.close()
         self.tasks: list[Task] = []
-        self.due_s = self.limit_s = 0.0
+        self.due_s = 0.0
 
     def give(self, tasks: list[Task]) -> None:
         """Raises OSError if the process has ended."""
         self.connection.send(tasks)
-        self.tasks = tasks
-        self._limit(START_S)
+        self.tasks, self.due_s = tasks, wall_time_s() + START_S
 
     def take(self, task_max_s: float) -> list[Outcome]:
         """The outcomes of its tasks; none yet: it begins with them.
@@ -78,14 +77,11 @@ class _Worker(Generic[Task, Outcome]):
             raise EOFError  # a child of it holds the connection open
         received = self.connection.recv()
         if received == _READY:
-            self._limit(task_max_s * len(self.tasks))
+            self.due_s = wall_time_s() + task_max_s * len(self.tasks)
             return []
         self.tasks = []
         outcomes: list[Outcome] = received
         return outcomes
-
-    def _limit(self, seconds: float) -> None:
-        self.limit_s, self.due_s = seconds, wall_time_s() + seconds
 
     def end(self) -> str:
         """Ends the process if it has not ended; how it ended, in words."""
@@ -159,7 +155,7 @@ class WorkerProcesses(Generic[Task, Outcome]):
         self._workers.remove(worker)
         worker.process.kill()
         worker.end()
-        yield from self._lost(tasks, f"hung: its process was ended after {worker.limit_s:g} s", waiting)
+        yield from self._lost(tasks, f"hung: its process was ended after {self._task_max_s:g} s", waiting)
 
     def _lost(self, tasks: list[Task], reason: str, waiting: list[list[Task]]) -> Iterator[tuple[Task, Outcome]]:
         if len(tasks) == 1:

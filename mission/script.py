@@ -56,7 +56,7 @@ FREE_YAW_RATE = 1 << 11
 FREE_BODY_RATES = 0b111
 FREE_ATTITUDE = 1 << 7
 
-_SAYS_S, _PREARM = 0.5, "PreArm: "  # until it has said why it may not be armed, and how
+_SAYS_S = 0.5  # until it has said why it may not be armed
 SENSOR_PREARM = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK
 
 
@@ -137,8 +137,8 @@ class Drone(Client):
             heard = len(self.texts)
             self._end.command(CMD_RUN_PREARM_CHECKS)
             await self.sleep(_SAYS_S)
-            told = [text.removeprefix(_PREARM) for text in self.texts[heard:] if text.startswith(_PREARM)]
-            raise ScriptTimeout(": ".join(filter(None, (str(timeout), ", ".join(told))))) from timeout
+            reasons = ", ".join(text.removeprefix("PreArm: ") for text in self.texts[heard:])
+            raise ScriptTimeout(": ".join(filter(None, (str(timeout), reasons)))) from timeout
 
     async def arm(self, *, force: bool = False) -> None:
         if not self.is_armed and self.px4_mode in ((MAIN_AUTO, AUTO_RTL), (MAIN_AUTO, AUTO_LAND)):

@@ -12,9 +12,6 @@ import pytest
 if TYPE_CHECKING:
     from mission.scenario.scenario import Scenario
 
-COLLECTED = pytest.StashKey[dict[Path, str]]()
-"""The scenarios' names by their files: of all that were collected, whichever of them are run."""
-
 
 class ScenarioFileCollector(pytest.File):
     """A scenario file."""
@@ -25,7 +22,6 @@ class ScenarioFileCollector(pytest.File):
 
         with refused():
             scenario = read_scenario(self.path)
-        self.config.stash.setdefault(COLLECTED, {})[self.path] = scenario.name
         for seed in scenario.seeds:
             yield ScenarioItem.from_parent(self, name=f"seed{seed}", scenario=scenario, seed=seed)
 
@@ -65,7 +61,7 @@ class ScenarioItem(pytest.Item):
         keep: Path | None = self.config.getoption("honeyguide_keep")
         if keep is None:
             return None
-        names = self.config.stash[COLLECTED]
+        names = {each.path: each._scenario.name for each in self.session.items if isinstance(each, ScenarioItem)}
         kept_as = dict(zip(names, run_names(list(names.items())), strict=True))
         folder = run_folder(keep, kept_as[self.path], self._seed)
         check_apart([folder], [self.path])

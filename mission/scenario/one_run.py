@@ -3,7 +3,6 @@
 In: a `Planned`. Out: a `Flown`. pytest flies it where it is, `honeyguide test` in a process, which it may take with it.
 """
 
-import json
 import shlex
 import shutil
 from collections.abc import Sequence
@@ -17,8 +16,6 @@ from mission.scenario.result import ScenarioResult
 from mission.scenario.runner import RESULT_FILE, run_scenario, write_result
 from mission.scenario.scenario import Scenario
 from mission.scenario.scenario_file import ScenarioFile
-
-_ENDED = "its process was ended"
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,12 +107,9 @@ class ScenarioRuns:
         try:
             if folder is None:
                 return Flown(result)
-            if not _is_begun(folder):
-                emptied(folder).mkdir(parents=True)
+            folder.mkdir(parents=True, exist_ok=True)
             write_result(folder, result)
             return Flown(result, command=keep_scenario(folder, planned.scenario, planned.seed))
-        except UserError as error:
-            return Flown(planned.refused(reason), note=str(error))
         except OSError as error:
             return Flown(result, note=_unwritten(planned, error))
 
@@ -126,17 +120,14 @@ def fly(planned: Planned) -> Flown:
     try:
         if folder is not None:  # from now on it is a kept run, whatever ends this process
             emptied(folder).mkdir(parents=True)
-            write_result(folder, planned.unjudged(_ENDED))
-    except UserError as error:
-        return Flown(None, planned.scenario.refusal(error, planned.file))
-    except OSError as error:
-        return Flown(None, _unwritten(planned, error))
-    try:
+            write_result(folder, planned.unjudged("its process was ended"))
         result = _judged(planned)
     except UserError as error:
         return Flown(None, planned.scenario.refusal(error, planned.file))
     except OSError as error:
-        return Flown(None, f"{planned.file}: {error.filename or planned.folder}: {error.strerror or error}")
+        if folder is None:
+            raise
+        return Flown(None, _unwritten(planned, error))
     try:
         return _kept(planned, result)
     except OSError as error:
@@ -148,11 +139,10 @@ def _judged(planned: Planned) -> ScenarioResult:
 
     Raises:
         UserError: it cannot be flown; nothing is left in its place.
-        OSError: likewise: a file that it needs is missing, or the disk is full.
     """
     try:
         return run_scenario(planned.scenario, planned.seed, folder=planned.folder, file=planned.file)
-    except (UserError, OSError):
+    except UserError:
         if planned.folder is not None:
             shutil.rmtree(planned.folder)
         raise
@@ -184,15 +174,6 @@ def _mcap_trouble(result: ScenarioResult) -> str:
     except (ConversionError, OSError) as error:
         return f"--mcap: {error}"
     return ""
-
-
-def _is_begun(folder: Path) -> bool:
-    """A run has begun in it, and has not come to its end."""
-    try:
-        found = json.loads((folder / RESULT_FILE).read_bytes())
-    except (OSError, ValueError):
-        return False
-    return isinstance(found, dict) and found.get("error") == _ENDED
 
 
 def _unwritten(planned: Planned, error: OSError) -> str:
