@@ -72,6 +72,11 @@ def emptied(folder: Path) -> Path:
     return folder
 
 
+def is_under_way(folder: Path) -> bool:
+    """Whether a run has begun there that is not kept yet: its scenario comes last."""
+    return (folder / RESULT_FILE).is_file() and not any(folder.glob(f"*{SUFFIX}"))
+
+
 def keep_scenario(folder: Path, scenario: Scenario, seed: int) -> str:
     """Writes the scenario of one run beside its logs, with the files it names; the command that flies it again."""
     given = scenario.model_copy(update={"seeds": (seed,)}).model_dump(mode="json", by_alias=True, exclude_unset=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from mission.console.option_checks import UserError
 from mission.scenario.flight.building import load_scenario_kernels
-from mission.scenario.keeping import check_apart, emptied, keep_scenario, run_folder, run_names
+from mission.scenario.keeping import check_apart, emptied, is_under_way, keep_scenario, run_folder, run_names
 from mission.scenario.result import ScenarioResult
 from mission.scenario.runner import RESULT_FILE, run_scenario, write_result
 from mission.scenario.scenario import Scenario
@@ -107,9 +107,12 @@ class ScenarioRuns:
         try:
             if folder is None:
                 return Flown(result)
-            folder.mkdir(parents=True, exist_ok=True)
+            if not is_under_way(folder):  # it was lost before it began there
+                emptied(folder).mkdir(parents=True)
             write_result(folder, result)
             return Flown(result, command=keep_scenario(folder, planned.scenario, planned.seed))
+        except UserError as error:
+            return Flown(replace(result, folder=""), note=str(error))
         except OSError as error:
             return Flown(result, note=_unwritten(planned, error))
 
@@ -125,8 +128,6 @@ def fly(planned: Planned) -> Flown:
     except UserError as error:
         return Flown(None, planned.scenario.refusal(error, planned.file))
     except OSError as error:
-        if folder is None:
-            raise
         return Flown(None, _unwritten(planned, error))
     try:
         return _kept(planned, result)
@@ -138,14 +139,16 @@ def _judged(planned: Planned) -> ScenarioResult:
     """The result of a run, whose folder is there.
 
     Raises:
-        UserError: it cannot be flown; nothing is left in its place.
+        UserError: it cannot be flown, or a file cannot be read; nothing is left in its place.
     """
     try:
         return run_scenario(planned.scenario, planned.seed, folder=planned.folder, file=planned.file)
-    except UserError:
+    except (UserError, OSError) as error:
         if planned.folder is not None:
             shutil.rmtree(planned.folder)
-        raise
+        if isinstance(error, UserError):
+            raise
+        raise UserError(f"{error.filename or planned.file}: {error.strerror or error}") from error
 
 
 def _kept(planned: Planned, result: ScenarioResult) -> Flown:
@@ -160,8 +163,8 @@ def _kept(planned: Planned, result: ScenarioResult) -> Flown:
     if result.passed and not planned.keeps_all:
         shutil.rmtree(folder)
         return Flown(replace(result, folder="", ulogs=(), tlogs=()))
-    command = keep_scenario(folder, planned.scenario, planned.seed)
-    return Flown(result, command=command, note=_mcap_trouble(result) if planned.has_mcap else "")
+    note = _mcap_trouble(result) if planned.has_mcap else ""
+    return Flown(result, command=keep_scenario(folder, planned.scenario, planned.seed), note=note)
 
 
 def _mcap_trouble(result: ScenarioResult) -> str:

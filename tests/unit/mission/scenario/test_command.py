@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mission.cli import app
+from mission.scenario import one_run
 from mission.scenario.keeping import emptied, run_names
 from mission.scenario.one_run import ScenarioRuns, fly, planned_runs
 from mission.scenario.scenario_file import ScenarioFile, read_scenario
@@ -185,6 +186,59 @@ def test_a_run_whose_logs_cannot_be_kept_is_one_sentence(folder):
     assert flown.result is None
     assert flown.refusal == f"{keep / 'hop-seed1'}: cannot be written: Not a directory"
     assert ScenarioRuns().lost(planned, "hung").note == f"{keep / 'hop-seed1'}: cannot be written: Not a directory"
+
+
+def planned_hop(folder):
+    """One run of the scenario, kept if it fails."""
+    files = [ScenarioFile(folder / "hop.scenario.yaml", read_scenario(folder / "hop.scenario.yaml"))]
+    (planned,) = planned_runs(files, [1], folder / "kept", keeps_all=False, has_mcap=False)
+    return planned
+
+
+def test_a_run_lost_before_it_began_leaves_what_is_no_kept_run(folder):
+    planned = planned_hop(folder)
+    planned.folder.mkdir(parents=True)
+    (planned.folder / "thesis.txt").write_text("mine")
+    flown = ScenarioRuns().lost(planned, "hung")
+    assert flown.note == f"{planned.folder}: is there already, and is no kept run"
+    assert (flown.result.error, flown.result.folder, flown.command) == ("hung", "", "")
+    assert [each.name for each in planned.folder.iterdir()] == ["thesis.txt"]
+
+
+def test_a_run_lost_before_it_began_is_not_mixed_with_an_earlier_one(folder):
+    planned = planned_hop(folder)
+    ScenarioRuns().lost(planned, "hung")
+    (planned.folder / "flight.ulg").touch()
+    assert ScenarioRuns().lost(planned, "died").command
+    assert {each.name for each in planned.folder.iterdir()} == {"result.json", "hop.scenario.yaml"}
+
+
+def test_a_run_lost_under_way_keeps_its_logs(folder, monkeypatch):
+    class Died(BaseException):
+        pass
+
+    def die(scenario, seed, *, folder, file):
+        (folder / "flight.ulg").touch()
+        raise Died
+
+    monkeypatch.setattr(one_run, "run_scenario", die)
+    planned = planned_hop(folder)
+    with pytest.raises(Died):
+        fly(planned)
+    assert ScenarioRuns().lost(planned, "died").command
+    assert {each.name for each in planned.folder.iterdir()} == {"flight.ulg", "result.json", "hop.scenario.yaml"}
+
+
+def test_a_file_that_cannot_be_read_is_not_called_unwritten(folder, monkeypatch):
+    def read(*_, **__):
+        raise FileNotFoundError(2, "No such file or directory", "tower.stl")
+
+    monkeypatch.setattr(one_run, "run_scenario", read)
+    planned = planned_hop(folder)
+    flown = fly(planned)
+    assert flown.result is None
+    assert flown.refusal == f"{planned.file}: tower.stl: No such file or directory"
+    assert not planned.folder.exists()
 
 
 def test_a_log_of_which_no_mcap_can_be_made_is_one_sentence(folder, monkeypatch):
