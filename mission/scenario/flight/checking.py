@@ -29,7 +29,7 @@ from sim.bodies.vehicles import class_of
 from sim.world.custom.world_file import WorldFile
 
 POLICY_STEPS = ("let_policy_fly", "policy_goto", "policy_park")
-POLICY_CHECKS = ("following", "scorecard", "interventions")
+POLICY_CHECKS = ("following", "scorecard", "interventions", "figures")
 START_GAP_M = 1.0  # between the centres of two vehicles; nearer, they stand in each other
 
 

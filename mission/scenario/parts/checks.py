@@ -261,7 +261,7 @@ class Interventions(Short):
     max_per_min: float = Field(ge=0.0)
 
 
-_OF_THE_WHOLE = ("at_end", "following", "scorecard", "interventions")
+_OF_THE_WHOLE = ("at_end", "following", "scorecard", "interventions", "figures")
 _OF_ANY_MODE = ("modes", "separation")
 
 
@@ -316,7 +316,7 @@ class Check(OneOf):
     scorecard: dict[FigureName, Range] | None = Field(default=None, min_length=1)
     """Figures of the scorecard of FollowMe, as `honeyguide follow` shows them, each with its bounds."""
     interventions: Interventions | None = None
-    figures: dict[MeasuredName, Range] | None = None
+    figures: dict[MeasuredName, Range] | None = Field(default=None, min_length=1)
     """What `policy_park` and `policy_goto` have measured, each with its bounds: how far from the middle of its spot it
     stood, how far it was turned, how long it took. Of several such steps the last counts."""
 

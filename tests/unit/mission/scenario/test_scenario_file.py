@@ -202,6 +202,7 @@ def test_a_fault_is_one_sentence_with_its_place(tmp_path, old, new, fault):
         ("following: {has_collision: null}", ".following: asks for nothing: needs in_band_min,"),
         ("scorecard: {}", ".scorecard: must not be empty"),
         ("scorecard: {in_view: {}}", ".scorecard.in_view: needs min, max or both"),
+        ("figures: {}", ".figures: must not be empty"),
     ],
 )
 def test_a_check_that_asks_for_nothing_is_refused(tmp_path, check, fault):
@@ -216,6 +217,7 @@ def test_a_check_that_asks_for_nothing_is_refused(tmp_path, check, fault):
         ("following:\n    to: 30", "to: following is of the whole flight"),
         ("scorecard: {in_view: {min: 0.5}}\n    during: hold", "during: scorecard is of the whole flight"),
         ("interventions: 3\n    from: 3", "from: interventions is of the whole flight"),
+        ("figures: {park_s: {max: 60}}\n    to: 30", "to: figures is of the whole flight"),
         ("modes: [land]\n    during: land", "during: modes is of all flight modes: leave it out, or use from and to"),
         ("separation: 3\n    during: land", "during: separation is of all flight modes"),
         ("not_heard: x\n    to: .nan", "to"),
@@ -415,6 +417,7 @@ def refused(text, tmp_path):
         ),
         ("checks:\n  - separation: 5\n", "2: checks[0].separation: there is one vehicle"),
         ("checks:\n  - following: {in_view_min: 0.5}\n", "2: checks[0].following: the vehicle has no policy"),
+        ("checks:\n  - figures: {park_s: {max: 60}}\n", "2: checks[0].figures: the vehicle has no policy"),
     ],
 )
 def test_what_cannot_be_flown_is_refused_before_with_its_place(tmp_path, text, said):
