@@ -60,12 +60,13 @@ class _Worker(Generic[Task, Outcome]):
         self.process.start()
         theirs.close()
         self.tasks: list[Task] = []
-        self.due_s = 0.0
+        self.max_s = self.due_s = 0.0
 
     def give(self, tasks: list[Task]) -> None:
         """Raises OSError if the process has ended."""
         self.connection.send(tasks)
-        self.tasks, self.due_s = tasks, wall_time_s() + START_S
+        self.tasks = tasks
+        self._allow(START_S)
 
     def take(self, task_max_s: float) -> list[Outcome]:
         """The outcomes of its tasks; none yet: it begins with them.
@@ -77,11 +78,15 @@ class _Worker(Generic[Task, Outcome]):
             raise EOFError  # a child of it holds the connection open
         received = self.connection.recv()
         if received == _READY:
-            self.due_s = wall_time_s() + task_max_s * len(self.tasks)
+            self._allow(task_max_s * len(self.tasks))
             return []
         self.tasks = []
         outcomes: list[Outcome] = received
         return outcomes
+
+    def _allow(self, max_s: float) -> None:
+        """From now on it may take so long."""
+        self.max_s, self.due_s = max_s, wall_time_s() + max_s
 
     def end(self) -> str:
         """Ends the process if it has not ended; how it ended, in words."""
@@ -155,7 +160,7 @@ class WorkerProcesses(Generic[Task, Outcome]):
         self._workers.remove(worker)
         worker.process.kill()
         worker.end()
-        yield from self._lost(tasks, f"hung: its process was ended after {self._task_max_s:g} s", waiting)
+        yield from self._lost(tasks, f"hung: its process was ended after {worker.max_s:g} s", waiting)
 
     def _lost(self, tasks: list[Task], reason: str, waiting: list[list[Task]]) -> Iterator[tuple[Task, Outcome]]:
         if len(tasks) == 1:

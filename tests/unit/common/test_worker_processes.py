@@ -6,6 +6,7 @@ from collections import Counter
 
 import pytest
 
+from common import worker_processes
 from common.clock import wall_sleep_s, wall_time_s
 from common.worker_processes import WorkerProcesses
 
@@ -66,6 +67,12 @@ def test_who_hangs_is_given_up_and_what_prepares_is_not():
         [("hang", "hang: hung: its process was ended after 1 s"), ("slow to start", "slow to start: done")]
     )
     assert wall_time_s() - begun_s < 20.0
+
+
+def test_who_hangs_as_it_starts_is_given_up_after_the_time_for_that(monkeypatch):
+    monkeypatch.setattr(worker_processes, "START_S", 0.5)
+    (found,) = outcomes("slow to start")
+    assert found == ("slow to start", "slow to start: hung: its process was ended after 0.5 s")
 
 
 def test_no_process_outlives_its_close():
