@@ -137,7 +137,8 @@ class Drone(Client):
             heard = len(self.texts)
             self._end.command(CMD_RUN_PREARM_CHECKS)
             await self.sleep(_SAYS_S)
-            reasons = ", ".join(text.removeprefix("PreArm: ") for text in self.texts[heard:])
+            said = [text for text in self.texts[heard:] if text.startswith("PreArm: ")]
+            reasons = ", ".join(text.removeprefix("PreArm: ") for text in said)
             raise ScriptTimeout(": ".join(filter(None, (str(timeout), reasons)))) from timeout
 
     async def arm(self, *, force: bool = False) -> None:

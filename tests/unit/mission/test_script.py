@@ -61,6 +61,26 @@ def test_takeoff_goto_and_land(flight):
     assert flight.controller.state.yaw_rad == pytest.approx(1.0, abs=0.1)
 
 
+def test_why_it_may_not_be_armed_is_what_its_checks_say(flight):
+    async def script(drone):
+        drone.texts.append("PreArm: said before")
+        told = drone.sleep
+
+        async def told_meanwhile(seconds):
+            await told(seconds)
+            drone.texts.extend(["Companion: searching", "PreArm: no GNSS fix"])
+
+        drone.sleep = told_meanwhile
+        with pytest.raises(ScriptTimeout) as timeout:
+            await drone.wait_ready(0.0)
+        return str(timeout.value)
+
+    reasons = result_of(flight, script).partition("ready to arm")[2]
+    assert reasons.endswith("no GNSS fix")
+    assert "Companion" not in reasons
+    assert "said before" not in reasons
+
+
 def test_goto_returns_only_when_it_is_there(flight):
     async def script(drone):
         await drone.wait_ready()
