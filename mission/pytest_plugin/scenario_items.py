@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from mission.scenario.scenario import Scenario
 
 
+_NAMES = pytest.StashKey[dict[Path, str]]()
+"""The scenario of each file that was collected, whichever tests are selected then."""
+
+
 class ScenarioFileCollector(pytest.File):
     """A scenario file."""
 
@@ -22,6 +26,7 @@ class ScenarioFileCollector(pytest.File):
 
         with refused():
             scenario = read_scenario(self.path)
+        self.session.stash.setdefault(_NAMES, {})[self.path] = scenario.name
         for seed in scenario.seeds:
             yield ScenarioItem.from_parent(self, name=f"seed{seed}", scenario=scenario, seed=seed)
 
@@ -61,7 +66,7 @@ class ScenarioItem(pytest.Item):
         keep: Path | None = self.config.getoption("honeyguide_keep")
         if keep is None:
             return None
-        names = {each.path: each._scenario.name for each in self.session.items if isinstance(each, ScenarioItem)}
+        names = self.session.stash[_NAMES]
         kept_as = dict(zip(names, run_names(list(names.items())), strict=True))
         folder = run_folder(keep, kept_as[self.path], self._seed)
         check_apart([folder], [self.path])

@@ -58,6 +58,13 @@ def test_runs_of_equal_names_are_kept_by_their_folders(pytester, run):
     assert sorted(each.name for each in (pytester.path / "kept").iterdir()) == ["a-hop-seed1", "b-hop-seed1"]
 
 
+def test_a_run_is_kept_in_the_same_folder_whichever_tests_are_selected(pytester, run):
+    for name in ("a", "b"):
+        pytester.mkdir(name).joinpath("hop.scenario.yaml").write_text(HOP)
+    run("--honeyguide-keep", "kept", "--honeyguide-keep-all", "-k", "b and seed1").assert_outcomes(passed=1)
+    assert [each.name for each in (pytester.path / "kept").iterdir()] == ["b-hop-seed1"]
+
+
 def test_a_wrong_file_is_one_sentence(pytester, run):
     (pytester.path / "hop.scenario.yaml").write_text("seeds: [1, 2]\nvehicle: {scrit: [arm]}\n")
     result = run()
