@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict
 
 from autopilot.mavlink.transport.links import GROUND_STATION_PORT, OFFBOARD_PORT
 from common.geodesy import DEFAULT_HOME
+from mission.console.help_texts import GUARD_SETTING
 from mission.console.model_command import option
 
 Pace = Literal["walk", "run"]
@@ -20,7 +21,6 @@ WORLD_KINDS = ("hills", "forest", "walled-forest", "course", "car-park")
 WORLD_FILES = (".yaml", ".yml")
 OURS: tuple[BoardName, ...] = ("own", "betaflight")
 """Under these it is our own flight controller that flies, with its options, parameters and links."""
-_GUARD_SETTING = "Sets a number of the guard: NAME=VALUE (docs/reference/guard-settings.md). Repeatable."
 _HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
 
 
@@ -141,7 +141,7 @@ class FollowOptions(FlightOptions):
     hill_height_m: float = option(8.0, "Height of the hills [m]; trained on 8.", "--hills", ge=0.0, le=300.0)
     airframe: str = option("x500", "Airframe name or TOML file; policies were trained on x500 and rover.")
     has_guard: bool = option(True, "A guard that does not believe the policy bounds it.", "--guard/--no-guard")
-    guard_settings: tuple[str, ...] = option((), _GUARD_SETTING, "--guard-setting")
+    guard_settings: tuple[str, ...] = option((), GUARD_SETTING, "--guard-setting")
     is_recorded: bool = option(
         False, "Keep each decision, with its picture, for a dataset (honeyguide dataset build).", "--record"
     )
@@ -165,7 +165,7 @@ class ParkOptions(FlightOptions):
     is_idle: bool = option(False, "Park nowhere by itself: wait for clicks on the page, and for gotos.", "--idle")
     airframe: str = option("rover", "Airframe name or TOML file; the policies were trained on rover.")
     has_guard: bool = option(True, "A guard that does not believe the policy bounds it.", "--guard/--no-guard")
-    guard_settings: tuple[str, ...] = option((), _GUARD_SETTING, "--guard-setting")
+    guard_settings: tuple[str, ...] = option((), GUARD_SETTING, "--guard-setting")
     is_recorded: bool = option(False, "Keep each decision for a dataset (honeyguide dataset build).", "--record")
     world_kind: str = "car-park"
     has_lidar: bool = True

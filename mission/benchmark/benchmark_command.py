@@ -8,7 +8,8 @@ from rich.console import Console
 
 from mission.benchmark.benchmark import FIRST_SEED, TASKS
 from mission.console.command_refusal import learn_extra, refuse
-from mission.console.guard_options import GUARD_SETTING, guard_of
+from mission.console.guard_options import guard_of
+from mission.console.help_texts import GUARD_SETTING
 from mission.console.terminal import loading
 
 

@@ -7,7 +7,6 @@ if TYPE_CHECKING:
     from policies.companion.guard.settings import GuardSettings
 
 FLAG = "--guard-setting"
-GUARD_SETTING = "Sets a number of the guard: NAME=VALUE (docs/reference/guard-settings.md). Repeatable."
 
 
 def guard_of(has_guard: bool, given: Sequence[str]) -> "GuardSettings":
