@@ -1,59 +1,91 @@
-"""`python -m bench.offline_story.batch SPLIT POLICY…`: policies on owners who walk and who run, in batch.
+"""`python -m bench.offline_story.batch training|flown POLICY…`: policies on owners who walk and who run, in batch.
 
-SPLIT is `train`, where a policy may be chosen, or `test`: worlds that nothing was chosen in.
-
-What flies over MAVLink has a guard and another simulation of camera and phone; in batch a policy is alone. This shows
-how far the two are apart, and how the policies of a story stand beside each other, whatever was forecast.
+`training` is where the policy that flies is chosen: worlds of training and all that may go wrong there. `flown` is as
+near to the flights over MAVLink as a batch comes: held-out worlds, the same densities of trees, no late images, nobody
+else, and only a collision ends an episode. What is left apart: another simulation of camera and phone; of the guard
+only its rules of the owner, not those of obstacles; and another draw of worlds and winds.
 """
 
 import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import torch
 
 from bench.follow.judge import first_episodes
-from bench.follow.stages import Cell
+from bench.follow.stages import TREES_PER_HA
 from policies.learn.export.policy_file import load_policy
 from policies.tasks.follow_me.follow_me import FollowMe
+from policies.tasks.follow_me.follow_me_params import IMPROVED, PARAMS, SEEN_BY_TRACKER
 from policies.tasks.follow_me.scorecard import scorecard
 from policies.tasks.follow_me.settings import FollowSettings
 
-CELLS = {"walk": Cell(100.0, 2.0), "run": Cell(100.0, 5.0)}
-"""By the name of the condition that flights are judged in."""
-EPISODES = 32  # of each condition
+OWNER_SPEEDS = {"walk": 2.0, "run": 5.0}
+"""[m/s] By the name of the condition that flights are judged in."""
+_NEVER = 1e6
+_DRAWN = {name for name, value in (IMPROVED | SEEN_BY_TRACKER).items() if not isinstance(value, float)}
+_AS_FLOWN = {param.name: param.default for param in PARAMS if param.name in _DRAWN - {"wind_m_s", "wind_gust_m_s"}}
 
 
-def judged(policies: dict[str, Path], split: str) -> dict[str, dict[str, Any]]:
-    """Of each policy and condition: time in the band with its interval, collisions, mean reward of an episode."""
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """Where policies are judged."""
+
+    split: Literal["train", "test"]
+    trees_per_ha: tuple[float, ...]
+    episodes: int  # of each pace and density
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+
+TRAINING = Conditions("train", (100.0,), 32)
+FLOWN = Conditions("test", TREES_PER_HA, 72, {**_AS_FLOWN, "lost_m": _NEVER, "unseen_limit_s": _NEVER})
+
+
+def judged(
+    policies: Mapping[str, Path], conditions: Conditions, numbers: Mapping[str, float] | None = None
+) -> dict[str, dict[str, Any]]:
+    """Of each policy and pace: time in the band with its interval, collisions, mean reward of an episode.
+
+    Args:
+        policies: files, by name.
+        conditions: where.
+        numbers: of the task, what its rewards weigh; none: its own.
+    """
     torch.set_num_threads(1)
     settings = FollowSettings.model_validate(
-        {"observation": "tracked", "owner": "any", "split": split, "terrain": "fresh", "stack": 3}
+        {"observation": "tracked", "owner": "any", "split": conditions.split, "terrain": "fresh", "stack": 3}
     )
-    task = FollowMe(settings, EPISODES)
+    task = FollowMe(settings, conditions.episodes)
     found: dict[str, dict[str, Any]] = {}
     for name, path in policies.items():
         policy, _ = load_policy(path)
-        for condition, cell in CELLS.items():
-            numbers = {"trees_per_ha": cell.trees_per_ha, "owner_speed_max": cell.owner_speed_max}
-            tracks, mean_return = first_episodes(policy, task, numbers)
+        for pace, speed in OWNER_SPEEDS.items():
+            tracks, returns = [], []
+            for trees in conditions.trees_per_ha:
+                world = {"trees_per_ha": trees, "owner_speed_max": speed}
+                flown, mean_return = first_episodes(policy, task, {**(numbers or {}), **conditions.numbers, **world})
+                tracks += flown
+                returns.append(mean_return)
             card = scorecard(tracks)
-            band = card.in_band
-            found.setdefault(name, {})[condition] = {
-                "in_band": [band.value, band.low, band.high],
+            found.setdefault(name, {})[pace] = {
+                "in_band": [card.in_band.value, card.in_band.low, card.in_band.high],
                 "collision": card.collision.value,
-                "mean_return": mean_return,
+                "mean_return": sum(returns) / len(returns),
+                "episodes": len(tracks),
             }
     return found
 
 
-def main(split: str, *paths: str) -> None:
-    """Prints a line of each policy and condition."""
-    for name, conditions in judged({path: Path(path) for path in paths}, split).items():
-        for condition, found in conditions.items():
-            value, low, high = (100.0 * share for share in found["in_band"])
+def main(where: str, *paths: str) -> None:
+    """Prints a line of each policy and pace."""
+    conditions = {"training": TRAINING, "flown": FLOWN}[where]
+    for name, paces in judged({path: Path(path) for path in paths}, conditions).items():
+        for pace, found in paces.items():
+            value, low, high = (100.0 * fraction for fraction in found["in_band"])
             ends = f"collisions {100.0 * found['collision']:.0f} %, return {found['mean_return']:.1f}"
-            print(f"{name}, {condition}: in the band {value:.1f} % ({low:.1f} to {high:.1f}), {ends}")
+            print(f"{name}, {pace}: in the band {value:.1f} % ({low:.1f} to {high:.1f}), {ends}")
 
 
 if __name__ == "__main__":
