@@ -8,6 +8,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,7 +27,7 @@ TRAINERS: dict[str, dict[str, Any]] = {
     "bc": {},
     "bc-best": {"best_fraction": 0.34},
     "iql": {"expectile": 0.8, "inverse_temperature": 3.0},
-    "td3_bc": {"alpha": 1.0},
+    "td3_bc": {"alpha": 2.5},
 }
 MIXES = {"": ("clumsy", "shipped"), "medium-": ("clumsy",)}
 """Whose flights are learnt from, by what the names of runs begin with: best thirds of the first are the expert's."""
@@ -34,7 +35,7 @@ ENV_ARGS = ("observation=tracked", "has_estimator=false", "owner=any", "terrain=
 NUMBERS = {"collision_cost": 80.0, "lost_cost": 40.0, "jerk_cost": 0.2}
 """Costs by which nothing is dearer than to lose the owner: with the task's own, whoever trembles pays less the sooner
 they are lost. The first two are those of policies/recipes/follow-me-tracked.yaml; by its jerk cost the mediocre pilot
-would pay for jerks nine tenths of all."""
+would pay for hardly anything but jerks."""
 CONDITIONS = ("walk", "run")
 FLOWN_SEED = 3_780_001  # odd, as of all that is judged
 
@@ -147,11 +148,15 @@ def _validate(folder: Path, mix: str) -> dict[str, Any]:
 
 
 def _draw_coverage(folder: Path) -> None:
-    """Where the policies of all flights leave them; fitted Q, which the image does not show, is hardly fitted."""
+    """Where the policies of all flights leave them, as `dataset judge --picture` draws it."""
+    from mission.dataset.judge import draw
+    from policies.offline.evaluation.datasets import judged
+
     if not COVERAGE.exists():
-        policies = [word for path in _policies(folder, "").values() for word in ("--policy", str(path))]
+        files = {str(path): name for name, path in _policies(folder, "").items()}
         datasets = [str(path) for path in _datasets(folder, "")]
-        _honeyguide("dataset", "judge", *datasets, *policies, "--steps", "1", "--picture", str(COVERAGE))
+        found = judged(datasets, list(files), None, {"steps": 1})  # no return is asked for
+        draw([replace(each, name=files[each.name]) for each in found], COVERAGE)
 
 
 def _match(folder: Path, chosen: dict[str, str]) -> dict[str, Any]:

@@ -1,14 +1,14 @@
 """`python -m bench.offline_story.batch training|flown POLICY…`: policies on owners who walk and who run, in batch.
 
-`training` is where the policy that flies is chosen: worlds of training and all that may go wrong there. `flown` is as
-near to the flights over MAVLink as a batch comes: held-out worlds, the same densities of trees, no late images, nobody
-else, and only a collision ends an episode. What is left apart: another simulation of camera and phone; of the guard
+Both are as near to the flights over MAVLink as a batch comes: the same densities of trees, no late images, nobody else,
+and only a collision ends an episode. `training` is in worlds of training, where the policy that flies is chosen;
+`flown` in worlds that nothing was chosen in. What is left apart: another simulation of camera and phone; of the guard
 only its rules of the owner, not those of obstacles; and another draw of worlds and winds.
 """
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -36,11 +36,12 @@ class Conditions:
     split: Literal["train", "test"]
     trees_per_ha: tuple[float, ...]
     episodes: int  # of each pace and density
-    numbers: Mapping[str, float] = field(default_factory=dict)
+    numbers: Mapping[str, float]
 
 
-TRAINING = Conditions("train", (100.0,), 32)
-FLOWN = Conditions("test", TREES_PER_HA, 72, {**_AS_FLOWN, "lost_m": _NEVER, "unseen_limit_s": _NEVER})
+_NUMBERS = {**_AS_FLOWN, "lost_m": _NEVER, "unseen_limit_s": _NEVER}
+TRAINING = Conditions("train", TREES_PER_HA, 24, _NUMBERS)
+FLOWN = Conditions("test", TREES_PER_HA, 72, _NUMBERS)
 
 
 def judged(

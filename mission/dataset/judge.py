@@ -1,7 +1,6 @@
 """`honeyguide dataset judge`: what policies would return, from recorded decisions alone; a table, JSON, an image."""
 
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from policies.offline.evaluation.datasets import Judged, judged
 
 _DECIMALS = 3
 _BINS = 24
+_VALUES_LEAST = 3  # of an element that an image is drawn over: two are a flag
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,13 +115,13 @@ def draw(found: list[Judged], target: Path) -> None:
 
 
 def _telling(each: Judged) -> tuple[int, int]:
-    """The two elements over whose deciles the distance varies most."""
+    """The two elements, no flags and not the same one of two frames, over whose deciles the distance varies most."""
     spread = []
     for column in each.observations.T:
-        if math.isclose(float(column.min()), float(column.max())):
+        if len(np.unique(column)) < _VALUES_LEAST:
             spread.append(-1.0)
             continue
         deciles = np.array_split(each.distances[np.argsort(column, kind="stable")], 10)
         spread.append(float(np.std([part.mean() for part in deciles if len(part)])))
-    order = np.argsort(spread)[::-1]
-    return int(order[0]), int(order[min(1, len(order) - 1)])
+    first, *others = (int(k) for k in np.argsort(spread)[::-1])
+    return first, next((k for k in others if each.elements[k] != each.elements[first]), first)

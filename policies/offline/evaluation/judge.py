@@ -115,7 +115,7 @@ class Judge:
             importance_weighted(episodes, settings.gamma, settings.clip, settings.seed),
             doubly_robust(episodes, settings.gamma, settings.clip, settings.seed),
             Interval(scale * found.mean, scale * found.low, scale * found.high),
-            effective_sample_size(episodes, settings.clip),
+            effective_sample_size(episodes),
             (distances > self.limit).astype(np.float64),
             distances,
         )

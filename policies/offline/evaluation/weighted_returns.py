@@ -59,9 +59,13 @@ def doubly_robust(episodes: PaddedEpisodes, gamma: float, clip: float, seed: int
     return _with_bootstrap(opinions, len(weights), seed)
 
 
-def effective_sample_size(episodes: PaddedEpisodes, clip: float) -> float:
-    """Episodes that the weighted ones are worth: squared sum over sum of squares (Kish 1965)."""
-    last = episodes.weights(clip)[:, -1]
+def effective_sample_size(episodes: PaddedEpisodes) -> float:
+    """Episodes that the weighted ones are worth: squared sum over sum of squares (Kish 1965).
+
+    Of the weights as they are: clipped ones are alike where all episodes are long, and would count as good evidence.
+    """
+    logs = episodes.log_ratios.sum(axis=1)
+    last = np.exp(logs - logs.max())
     return float(last.sum() ** 2 / np.square(last).sum())
 
 

@@ -44,7 +44,13 @@ def test_importance_weighted_return_is_that_by_hand():
 
 def test_effective_episodes_are_those_by_hand():
     episodes = PaddedEpisodes(RATIOS, REWARDS, NONE, NONE)
-    assert effective_sample_size(episodes, 100.0) == pytest.approx(6.5**2 / (36.0 + 0.25))
+    assert effective_sample_size(episodes) == pytest.approx(6.5**2 / (36.0 + 0.25))
+
+
+def test_long_episodes_that_one_outweighs_are_worth_one_whatever_the_clip():
+    episodes = PaddedEpisodes(np.full((3, 100), 0.5) + np.array([[0.0], [0.1], [0.3]]), np.zeros((3, 100)), NONE, NONE)
+    assert len(np.unique(episodes.weights(1000.0)[:, -1])) == 1
+    assert effective_sample_size(episodes) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_doubly_robust_return_is_that_by_hand():
