@@ -60,7 +60,8 @@ def write_page(folder: Path, story: Story) -> None:
         "",
         "![Time in the band](images/offline.png)",
         "",
-        "Success in batch while they learn, in 64 episodes, and where the policies of all flights leave them:",
+        "Success in batch while they learn, in 64 episodes of the conditions of training, and where the policies of "
+        "all flights leave them:",
         "",
         "![Training curves](images/offline-curves.png)",
         "",
