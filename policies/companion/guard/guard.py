@@ -136,7 +136,7 @@ class Guard:
         if self.senses.is_heard and track is not None and track.is_known:
             way = np.array(track.pos_ned[:2]) - np.array(own.pos_ned[:2])
             far_m = float(np.hypot(*way))
-            yaw_rate = self._facing(atan2(way[1], way[0]), own)
+            yaw_rate = self._facing(track.pos_ned, own)
             if not is_searching or far_m < 0.1:
                 self._there_us = own.boot_us
                 return np.zeros(2), down, yaw_rate
@@ -153,23 +153,19 @@ class Guard:
             return level, down, s.search_yaw_rate
         if is_searching or not self.senses.seen.sights:
             return np.zeros(2), down, s.search_yaw_rate
-        return np.zeros(2), down, self._facing(self._last_bearing(own), own)
-
-    def _last_bearing(self, own: Own) -> float:
-        """To where the owner was going when they were seen last [rad], in ned."""
-        way = self.senses.seen.now(own.boot_us)[0][:2] - np.array(own.pos_ned[:2])
-        return atan2(way[1], way[0])
+        return np.zeros(2), down, self._facing(self.senses.seen.now(own.boot_us)[0], own)  # where they were going
 
     def _facing_owner(self, own: Own, yaw_rate: float) -> float:
         """Towards where sights and phone put an owner who is not seen; a yaw rate if nobody knows."""
         known = self.senses.owner_now(own)
         if known is None or not self.senses.is_heard:
             return yaw_rate
-        way = known.pos_ned[:2] - np.array(own.pos_ned[:2])
-        return self._facing(atan2(way[1], way[0]), own)
+        return self._facing(known.pos_ned, own)
 
-    def _facing(self, bearing_rad: float, own: Own) -> float:
-        error = wrapped(bearing_rad - yaw_of(own.q_ned_from_frd))
+    def _facing(self, place_ned: Floats, own: Own) -> float:
+        """The yaw rate with which it turns its nose to a place."""
+        north, east = np.array(place_ned[:2]) - np.array(own.pos_ned[:2])
+        error = wrapped(atan2(east, north) - yaw_of(own.q_ned_from_frd))
         return float(np.clip(_FACE_GAIN * error, -_YAW_MAX, _YAW_MAX))
 
     def _past_people(self, level: Floats, own: Own) -> tuple[Floats, list[Somebody]]:

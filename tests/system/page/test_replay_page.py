@@ -10,17 +10,10 @@ from mission.simulator.flight_rig import flight_world
 from mission.view.html import write_html
 from mission.view.page import PageServer
 from mission.view.replay import ReplayView
-from tests.browser import CHROMIUM, Browser
+from tests.browser import CHROMIUM
 from tests.unit.mission.view.rows import CONFIG, hovering
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: apt install chromium")
-
-
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory):
-    opened = Browser(tmp_path_factory.mktemp("profile"))
-    yield opened
-    opened.close()
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from mission.campaign.findings import findings_of
 from mission.campaign.report.page import REPORT_FILE, write_report
 from mission.campaign.runs import Record
 from mission.campaign.search.bisection import BoundaryFound, Bracket
-from tests.browser import CHROMIUM, Browser
+from tests.browser import CHROMIUM
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: apt install chromium")
 
@@ -46,13 +46,6 @@ def boundary():
         Bracket(seed, 6.9, 7.0, [record(i, 10.0 * i / 4, f"bisect-{seed}", seed) for i in range(5)]) for seed in (1, 2)
     )
     return BoundaryFound("wind.speed_m_s", 0.0, 10.0, 0.1, brackets)
-
-
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory):
-    opened = Browser(tmp_path_factory.mktemp("profile"))
-    yield opened
-    opened.close()
 
 
 @pytest.fixture(scope="module")

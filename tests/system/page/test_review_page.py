@@ -4,17 +4,10 @@ import pytest
 
 from mission.review.flight_review import review_flight
 from mission.review.review_page import review_page
-from tests.browser import CHROMIUM, Browser
+from tests.browser import CHROMIUM
 from tests.unit.mission.review.px4_logs import ALL, write
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: apt install chromium")
-
-
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory):
-    opened = Browser(tmp_path_factory.mktemp("profile"))
-    yield opened
-    opened.close()
 
 
 @pytest.fixture(scope="module")
