@@ -36,6 +36,10 @@ class FlightSettings(BaseModel):
     """Clockwise from north."""
     noise: float = option(1.0, "Scale of all sensor noise.", ge=0.0, le=10.0)
     """Of the onboard camera's, too; 0 makes them perfect."""
+    sensor_roughness: float = option(
+        0.0, "Vibration and magnetic noise: 1 as in the roughest of five real logs.", ge=0.0, le=1.0
+    )
+    """0 is a well isolated controller's."""
     airframe: str = option("x500", "Airframe name or TOML file.")
     dialect: Literal["px4", "ardupilot"] = option("px4", "What ground stations take it for: px4 or ardupilot.")
     """Which autopilot's numbers they get. The flight's own script always gets PX4's."""
@@ -149,10 +153,10 @@ class FollowOptions(FlightOptions):
 
 
 FOLLOWED_WITH = (
-    "policy", "owner", "seconds", "speed", "seed", "wind_m_s", "wind_from_deg", "noise", "world_seed", "trees_per_ha",
-    "hill_height_m", "airframe", "dialect", "engine", "board", "command", "instance", "parameters", "has_guard",
-    "guard_settings", "is_recorded", "has_view", "view_port", "has_film", "has_mcap", "has_foxglove", "foxglove_port",
-    "gcs_port", "api_port", "host", "run_folder",
+    "policy", "owner", "seconds", "speed", "seed", "wind_m_s", "wind_from_deg", "noise",
+    "sensor_roughness", "world_seed", "trees_per_ha", "hill_height_m", "airframe", "dialect", "engine", "board",
+    "command", "instance", "parameters", "has_guard", "guard_settings", "is_recorded", "has_view", "view_port",
+    "has_film", "has_mcap", "has_foxglove", "foxglove_port", "gcs_port", "api_port", "host", "run_folder",
 )  # fmt: skip
 
 
@@ -174,6 +178,6 @@ class ParkOptions(FlightOptions):
 
 PARKED_WITH = (
     "policy", "spot", "is_reverse", "is_idle", "speed", "seconds", "seed", "wind_m_s", "wind_from_deg", "noise",
-    "world_seed", "airframe", "parameters", "has_guard", "guard_settings", "is_recorded", "has_view", "view_port",
-    "has_mcap", "has_foxglove", "foxglove_port", "gcs_port", "api_port", "host", "run_folder",
+    "sensor_roughness", "world_seed", "airframe", "parameters", "has_guard", "guard_settings", "is_recorded",
+    "has_view", "view_port", "has_mcap", "has_foxglove", "foxglove_port", "gcs_port", "api_port", "host", "run_folder",
 )  # fmt: skip

@@ -195,6 +195,8 @@ class Scenario(Part):
     wind: Wind = Wind()
     noise: float = Field(default=1.0, ge=0.0, le=10.0)
     """Scale of all sensor noise."""
+    sensor_roughness: float = Field(default=0.0, ge=0.0, le=1.0)
+    """Vibration and magnetic noise; 1: as in the roughest of five real logs."""
     engine: EngineName = "native"
     """Who moves the body."""
     traffic: int = Field(default=0, ge=0, le=50)

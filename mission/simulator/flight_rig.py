@@ -44,7 +44,7 @@ def flight_rig(
     rig = (make_rig or rig_with(config.engine, airframe))(
         airframe,
         world,
-        sensor_model(noise_scale=config.noise, home=config.home),
+        sensor_model(config.noise, config.home, config.sensor_roughness),
         flight_wind(config.wind_m_s, config.wind_from_deg),
         home=config.home,
         seed=config.seed,

@@ -37,7 +37,7 @@ class BatchFlight(FlightBase):
         row: Any = RowRig(rig, i_vehicle)
         self.rig = row
         row.seed(config.seed)
-        row.set_sensors(sensor_model(noise_scale=config.noise, home=config.home))
+        row.set_sensors(sensor_model(config.noise, config.home, config.sensor_roughness))
         row.set_air(flight_wind(config.wind_m_s, config.wind_from_deg))
         if scenario.wind.turbulence_m_s is not None:
             self.set_air(scenario.wind.speed_m_s, scenario.wind.from_deg, scenario.wind.turbulence_m_s)

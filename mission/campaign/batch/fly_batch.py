@@ -116,7 +116,7 @@ def _rig(config: FlightConfig, world: Any, count: int) -> Rig:
     airframe = load_airframe(config.airframe)
     vehicle, body = class_of(airframe)
     return Rig(
-        airframe, world, sensor_model(noise_scale=config.noise, home=config.home),
+        airframe, world, sensor_model(config.noise, config.home, config.sensor_roughness),
         flight_wind(config.wind_m_s, config.wind_from_deg), home=config.home, vehicle_count=count, body=body,
         law=vehicle.law, start_ne_m=config.start_ne_m, heading_deg=config.start_heading_deg,
     )  # fmt: skip

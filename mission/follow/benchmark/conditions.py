@@ -37,6 +37,7 @@ class Condition:
     wind_m_s: float | None = None
     """None: by the seed."""
     airframe: str = AIRFRAME
+    sensor_roughness: float = 0.0
 
 
 CONDITIONS = (
@@ -73,6 +74,7 @@ CONDITIONS = (
     Condition("dusk", "dusk", "walk", {"light": 0.12}, 0.9),
     Condition("blur", "pictures blurred by 33 ms", "walk", {"shutter_s": 0.033}, 0.9),
     Condition("wind", "wind of 10 m/s", "walk", {}, 0.9, wind_m_s=10.0),
+    Condition("rough", "sensors as in the roughest real log", "walk", {}, 0.95, sensor_roughness=1.0),
     Condition("f450", "airframe F450, smaller", "walk", {}, 0.95, airframe="f450"),
     Condition("f550", "airframe F550, of six motors", "walk", {}, 0.95, airframe="f550"),
 )

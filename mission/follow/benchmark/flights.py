@@ -58,7 +58,14 @@ def flight_of(condition: Condition, seed: int) -> FlightConfig:
     world = FOLLOW_WORLD.model_copy(update={"trees_per_ha": TREES_PER_HA[k % 3], "seed": seed})
     owner = OwnerConfig(pace=condition.pace, numbers=dict(condition.numbers))
     wind_m_s = WINDS_M_S[k % 5] if condition.wind_m_s is None else condition.wind_m_s
-    return FlightConfig(owner=owner, world=world, seed=seed, wind_m_s=wind_m_s, airframe=condition.airframe)
+    return FlightConfig(
+        owner=owner,
+        world=world,
+        seed=seed,
+        wind_m_s=wind_m_s,
+        airframe=condition.airframe,
+        sensor_roughness=condition.sensor_roughness,
+    )
 
 
 def fly(

@@ -140,6 +140,7 @@ def _own_configs(scenario: Scenario, seed: int) -> tuple[FlightConfig, list[Flig
         wind_m_s=scenario.wind.speed_m_s,
         wind_from_deg=scenario.wind.from_deg,
         noise=scenario.noise,
+        sensor_roughness=scenario.sensor_roughness,
         engine=scenario.engine,
         traffic_count=scenario.traffic,
         home=home,

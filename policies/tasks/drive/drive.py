@@ -46,9 +46,10 @@ class Drive(FlightTask):
             has_estimator=settings.has_estimator,
             number_defaults=PRESETS[settings.preset],
             device=device,
-            airframe_name=AIRFRAME,
+            airframes=(AIRFRAME,),
             sensors=rtk_sensors,
-            bank=standing_bank(AIRFRAME, rtk_sensors, settings.has_estimator, device),
+            split=settings.split,
+            bank=standing_bank(AIRFRAME, rtk_sensors, settings.has_estimator, device, settings.split),
         )
         self.settings = settings
         self.driving = self._state()
@@ -58,7 +59,7 @@ class Drive(FlightTask):
         rules.spot_count = world.spot_count
         rules.decision_s = self.decision_s
         buffers, rig, state = self.buffers, self.rig.arrays, self.driving
-        start = self.start(is_test=settings.split == "test")
+        start = self.start()
         self._act = self.record(act, buffers, rig)
         self._judge = self.record(judge, buffers, rules, rig, state, start)
         self._prepare = self.record(prepare, buffers, state, start)

@@ -1,6 +1,7 @@
 """Draws at an episode's start that are not numbers: keyed by seed, environment and episode, like those.
 
-Training and test episodes draw their seeds of worlds, paths and noise from two disjoint sets: even and odd numbers.
+Seeds of worlds, paths and noise are of disjoint sets: odd numbers in tests, those that four divides in training, and
+the other even ones in validation.
 """
 
 import warp as wp
@@ -14,13 +15,19 @@ NOISE_STREAM = wp.constant(2)
 HOVER_STREAM = wp.constant(3)
 WIND_STREAM = wp.constant(4)
 PATH_STREAM = wp.constant(5)
+SPLITS = ("train", "validation", "test")
+_VALIDATION = wp.constant(1)
+_TEST = wp.constant(2)
 _SEED_BITS = wp.constant(wp.uint32(0x3FFFFFFF))
 
 
 @wp.func
-def draw_seed(seed: int, i_env: int, episode: int, stream: int, is_test: int) -> int:
-    """A seed below 2**31: even in training, odd in tests."""
-    return 2 * int(draw_key(seed, i_env, episode, stream) & _SEED_BITS) + is_test
+def draw_seed(seed: int, i_env: int, episode: int, stream: int, split: int) -> int:
+    """A seed below 2**31; `split` is a place in `SPLITS`."""
+    drawn = int(draw_key(seed, i_env, episode, stream) & _SEED_BITS)
+    if split == _TEST:
+        return 2 * drawn + 1
+    return 4 * (drawn // 2) + wp.where(split == _VALIDATION, 2, 0)
 
 
 @wp.func

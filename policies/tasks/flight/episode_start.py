@@ -20,7 +20,7 @@ class Start:
     noise_seeds: wp.array(dtype=int)
     hovers: wp.array(dtype=int)
     hover_count: int
-    is_test: int
+    split: int  # a place in SPLITS
     world_params: wp.array(dtype=WorldParams)
     makes: Makes
 
@@ -30,7 +30,7 @@ def begin_flight(buffers: StepBuffers, start: Start, i: int) -> int:
     """Begins a row's episode, draws its noise and its hover, and returns its index."""
     seed = buffers.seed[i]
     episode = begin_episode(buffers, i)
-    start.noise_seeds[i] = draw_seed(seed, i, episode, NOISE_STREAM, start.is_test)
+    start.noise_seeds[i] = draw_seed(seed, i, episode, NOISE_STREAM, start.split)
     start.hovers[i] = draw_index(seed, i, episode, HOVER_STREAM, start.hover_count)
     return episode
 
@@ -41,7 +41,7 @@ def ask_for_world(
 ) -> None:
     """Has a world grown for a row's episode."""
     start.is_growing[i] = True
-    start.world_seeds[i] = draw_seed(buffers.seed[i], i, episode, WORLD_STREAM, start.is_test)
+    start.world_seeds[i] = draw_seed(buffers.seed[i], i, episode, WORLD_STREAM, start.split)
     world = start.world_params[i]
     world.hill_height_m = hill_height_m
     world.trees_per_ha = trees_per_ha

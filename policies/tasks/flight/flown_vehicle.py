@@ -12,7 +12,6 @@ from policies.tasks.flight.episode_draws import WIND_STREAM, draw_angle
 from policies.tasks.flight.flight_params import FlightParams
 from policies.tasks.flight.own_state import Command, OwnState
 from sim.advance import RigArrays, forget_impacts
-from sim.bodies.body import DEFAULT_BODY
 from sim.sensors.sensors import SensorModel
 from sim.truth import true_estimate
 from sim.wind import WindModel, WindState
@@ -25,9 +24,8 @@ _LEVELS = wp.constant(float(NOISE_LEVELS_PER_UNIT))
 
 @wp.struct
 class Makes:
-    """What vehicles are made of before they are varied."""
+    """What vehicles carry before they are varied."""
 
-    body: wp.array(dtype=DEFAULT_BODY.Model)  # (1,)
     sensors: wp.array(dtype=SensorModel)  # by noise scale: 0, 0.25, 0.5 ...
 
 
@@ -52,7 +50,7 @@ def wind_of_episode(wind: WindModel, params: FlightParams, seed: int, i: int, ep
 @wp.func
 def vary_vehicle(rig: RigArrays, makes: Makes, params: FlightParams, seed: int, i: int, episode: int) -> None:
     """Gives row i the air, the sensors, the mass and the motors of its episode."""
-    model = makes.body[0]
+    model = rig.model[i]  # as its hover has it
     model.mass_kg = model.mass_kg * params.mass_scale
     model.mass_inv = model.mass_inv / params.mass_scale
     model.inertia_frd = model.inertia_frd * params.mass_scale

@@ -12,9 +12,11 @@ import numpy as np
 from autopilot.params import parameter_table
 from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
+from policies.tasks.flight.episode_draws import SPLITS
+from policies.tasks.flight.settings import RigSplit
 from sim.bodies.vehicles import class_of
 from sim.hovering import Hover, fly_to_hover
-from sim.rig import Rig
+from sim.rig import Rig, Rows
 from sim.sensors.sensors import SensorModel, sensor_model
 from sim.wind import wind_model
 from sim.world.batch import WorldBatch
@@ -36,6 +38,7 @@ def build_rig(
     device: str,
     airframe_name: str = AIRFRAME,
     sensors: Callable[[float], SensorModel] = sensor_model,
+    seed: int = 0,
 ) -> Rig:
     """Vehicles with the default flight controller of their class, powered on at home."""
     airframe = load_airframe(airframe_name)
@@ -47,6 +50,7 @@ def build_rig(
         wind_model(0.0),
         home=DEFAULT_HOME,
         vehicle_count=count,
+        seed=seed,
         has_estimator=has_estimator,
         threads=threads,
         device=device,
@@ -58,10 +62,47 @@ def build_rig(
 
 
 @cache
-def hover_bank(has_estimator: bool, device: str, heights_m: tuple[float, float] = LOW_M) -> Rig:
-    """Vehicles that hover above home, between two heights, each with a heading of its own."""
-    rig = build_rig(build_world(PLAIN, device), HOVER_COUNT, has_estimator=has_estimator, threads=1, device=device)
-    rng = np.random.default_rng(0)
+def hover_bank(
+    has_estimator: bool,
+    device: str,
+    heights_m: tuple[float, float] = LOW_M,
+    split: RigSplit = "train",
+    airframes: tuple[str, ...] = (AIRFRAME,),
+) -> Rig:
+    """Vehicles that hover above home, between two heights, each with a heading of its own; as many of each airframe."""
+    if len(airframes) == 1:
+        return _hovering(has_estimator, device, heights_m, split, airframes[0])
+    parts = [hover_bank(has_estimator, device, heights_m, split, (name,)) for name in airframes]
+    bank = _parked(has_estimator, device, HOVER_COUNT * len(parts), airframes[0], seed=0)
+    bank.restore([_joined(rows) for rows in zip(*(part.snapshot() for part in parts), strict=True)])
+    return bank
+
+
+def _joined(parts: tuple[Rows, ...]) -> Rows:
+    """One after the other, laid out as they are: `np.concatenate` packs structs."""
+    joined = np.empty((sum(len(part) for part in parts), *parts[0].shape[1:]), parts[0].dtype)
+    return np.concatenate(parts, out=joined, casting="unsafe")
+
+
+def _parked(has_estimator: bool, device: str, count: int, airframe_name: str, seed: int) -> Rig:
+    plain = build_world(PLAIN, device)
+    return build_rig(
+        plain,
+        count,
+        has_estimator=has_estimator,
+        threads=1,
+        device=device,
+        airframe_name=airframe_name,
+        seed=seed,
+    )
+
+
+def _hovering(
+    has_estimator: bool, device: str, heights_m: tuple[float, float], split: RigSplit, airframe_name: str
+) -> Rig:
+    seed = SPLITS.index(split)
+    rig = _parked(has_estimator, device, HOVER_COUNT, airframe_name, seed)
+    rng = np.random.default_rng(seed)
     low, high = heights_m
     middle, spread = np.array([0.0, 0.0, -0.5 * (low + high)]), np.array([_SPREAD_M, _SPREAD_M, 0.5 * (high - low)])
     hovers: list[Hover] = []

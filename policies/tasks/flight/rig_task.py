@@ -11,13 +11,14 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from policies.tasks.flight.episode_draws import SPLITS
 from policies.tasks.flight.episode_start import Start
 from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT, Makes
 from policies.tasks.flight.hover_bank import AIRFRAME, LOW_M, build_rig, hover_bank
+from policies.tasks.flight.settings import RigSplit
 from policies.tasks.layout import Layout
 from policies.tasks.task import Task
 from policies.tasks.task_params import Sampler
-from sim.bodies.body import DEFAULT_BODY
 from sim.restore import RowRestore
 from sim.rig import Rig
 from sim.sensors.sensors import SensorModel, sensor_model
@@ -40,7 +41,8 @@ class RigTask(Task):
         number_defaults: Mapping[str, float | Sampler],
         device: str,
         hover_heights_m: tuple[float, float] = LOW_M,
-        airframe_name: str = AIRFRAME,
+        split: RigSplit = "train",
+        airframes: tuple[str, ...] = (AIRFRAME,),
         sensors: Callable[[float], SensorModel] = sensor_model,
         bank: Rig | None = None,
     ) -> None:
@@ -51,29 +53,28 @@ class RigTask(Task):
             has_estimator=has_estimator,
             threads=worker_count(device),
             device=device,
-            airframe_name=airframe_name,
+            airframe_name=airframes[0],
             sensors=sensors,
         )
         self.noise_seeds = self._zeros("noise_seeds", env_count, int)
         self.hovers = self._zeros("hovers", env_count, int)  # of the bank, that the episode started from
         self.is_starting = self._zeros("is_starting", env_count, wp.bool)
-        bank = bank or hover_bank(has_estimator, device, hover_heights_m)
+        self._split = split
+        bank = bank or hover_bank(has_estimator, device, hover_heights_m, split, airframes)
         self._bank_count = bank.vehicle_count
         self._restore = RowRestore(self.rig, bank, self.hovers, self.is_starting, self.noise_seeds)
         levels = [sensors(k / NOISE_LEVELS_PER_UNIT) for k in range(_NOISE_MAX * NOISE_LEVELS_PER_UNIT + 1)]
         self.makes: Any = Makes()
         self.makes.sensors = wp.array(levels, dtype=SensorModel, device=device)
-        if self.rig.body is DEFAULT_BODY:
-            self.makes.body = wp.clone(self.rig.models[:1])
 
-    def start(self, *, is_test: bool) -> Any:
+    def start(self) -> Any:
         """What episodes start with, for kernels: a `Start`."""
         start = Start()
         start.is_starting = self.is_starting
         start.noise_seeds = self.noise_seeds
         start.hovers = self.hovers
         start.hover_count = self._bank_count
-        start.is_test = int(is_test)
+        start.split = SPLITS.index(self._split)
         start.makes = self.makes
         return start
 

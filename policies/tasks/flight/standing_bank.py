@@ -12,7 +12,9 @@ import warp as wp
 
 from autopilot.control.law import ControlLaw
 from autopilot.navigator.setpoint import SetpointPort
+from policies.tasks.flight.episode_draws import SPLITS
 from policies.tasks.flight.hover_bank import PLAIN, build_rig
+from policies.tasks.flight.settings import RigSplit
 from sim.advance import rig_arrays
 from sim.bodies.body import Body
 from sim.hovering import ALIGN_TICKS
@@ -42,8 +44,15 @@ def _stand_kernel(body: Body, law: ControlLaw) -> Any:
 
 
 @cache
-def standing_bank(airframe_name: str, sensors: Callable[[float], SensorModel], has_estimator: bool, device: str) -> Rig:
-    """Vehicles that stand at home on level ground, armed and braked, evenly in all directions."""
+def standing_bank(
+    airframe_name: str,
+    sensors: Callable[[float], SensorModel],
+    has_estimator: bool,
+    device: str,
+    split: RigSplit = "train",
+) -> Rig:
+    """Vehicles that stand at home on level ground, armed and braked, evenly in all directions, of each split others."""
+    seed = SPLITS.index(split)
     rig = build_rig(
         build_world(PLAIN, device),
         STANDING_COUNT,
@@ -52,8 +61,11 @@ def standing_bank(airframe_name: str, sensors: Callable[[float], SensorModel], h
         device=device,
         airframe_name=airframe_name,
         sensors=sensors,
+        seed=seed,
     )
-    yaws = wp.array(np.linspace(-np.pi, np.pi, STANDING_COUNT, endpoint=False), dtype=float, device=device)
+    between = 2.0 * np.pi / STANDING_COUNT * seed / len(SPLITS)
+    headings = between + np.linspace(-np.pi, np.pi, STANDING_COUNT, endpoint=False)
+    yaws = wp.array(headings, dtype=float, device=device)
     wp.launch(_stand_kernel(rig.body, rig.law), STANDING_COUNT, [rig.arrays, yaws], device=device)
     rig.power_on(wp.full(STANDING_COUNT, 1, dtype=int, device=device))
     rig.rows.fetch()

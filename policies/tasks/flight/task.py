@@ -51,9 +51,9 @@ class FlightTask(RigTask):
         self.world_seeds = self._zeros("world_seeds", env_count, int)
         self.is_growing = self._zeros("is_growing", env_count, wp.bool)
 
-    def start(self, *, is_test: bool) -> Any:
+    def start(self) -> Any:
         """As of every flown task, with the worlds that are to grow."""
-        start = super().start(is_test=is_test)
+        start = super().start()
         start.is_growing = self.is_growing
         start.world_seeds = self.world_seeds
         start.world_params = self.worlds.params

@@ -91,6 +91,8 @@ class FollowMe(FlightTask):
             has_estimator=settings.has_estimator,
             number_defaults=_numbers(settings) | {"owner_speed_max": _OWNERS[settings.owner]},
             device=device,
+            split=settings.split,
+            airframes=settings.airframes,
             hover_heights_m=LOW_M if is_documented else _TAKEOVER_M,
         )
         self.settings = settings
@@ -107,7 +109,7 @@ class FollowMe(FlightTask):
         if self._is_tracked:
             self._sight_way = make_way(self._zeros, (1, 1, 1), env_count)  # of images that nobody takes
             state.image_ages_s = self._sight_way.age_s
-        self._record_all(_rules(settings, self.layout), self.start(is_test=settings.split == "test"))
+        self._record_all(_rules(settings, self.layout), self.start())
 
     def _launch_step(self) -> None:
         """What `step` does of the task's own."""

@@ -46,6 +46,7 @@ from policies.tasks.follow_me.tracked.vector import command_fractions, next_comm
 from sim.advance import RigArrays
 from sim.sensors.camera import Lens
 from sim.sensors.phone import PhoneModel, PhoneState, phone_start, phone_step
+from sim.sensors.sensors import roughened
 from sim.truth import has_touched
 from sim.world.clothes import Clothes
 from sim.world.people import PERSON_DT_S, PERSON_TICKS, Person, PersonModel, person_step
@@ -296,7 +297,7 @@ def prepare(buffers: StepBuffers, rules: Rules, state: FollowState, start: Start
     params = state.params[i]
     state.actions[i] = wp.vec4()
     state.unseen_s[i] = 0.0
-    state.path_seeds[i] = draw_seed(buffers.seed[i], i, episode, PATH_STREAM, start.is_test)
+    state.path_seeds[i] = draw_seed(buffers.seed[i], i, episode, PATH_STREAM, start.split)
     if rules.is_kept == 0 or episode == 0:
         ask_for_world(buffers, start, i, episode, params.hill_height_m, params.trees_per_ha)
 
@@ -320,6 +321,7 @@ def place(buffers: StepBuffers, rig: RigArrays, state: FollowState, start: Start
     episode = buffers.episodes[i] - 1
     params = state.params[i]
     vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)
+    rig.sensor_model[i] = roughened(rig.sensor_model[i], params.sensor_roughness)
     state.person_models[i] = owner_of(state.usual_person[0], params)
     state.phone_models[i] = phone_of(state.usual_phone[0], params)
     # ahead, some way to one side, looking anywhere

@@ -80,6 +80,7 @@ class FollowParams:
     document_within: float
     document_beyond: float
     document_collision: float
+    sensor_roughness: float
 
 
 FOLLOW_PARAMS = (
@@ -185,6 +186,15 @@ FOLLOW_PARAMS = (
     ),
     TaskParam("document_beyond", -0.05, -10.0, 10.0, "1", "document: per payment otherwise", _DOCUMENT),
     TaskParam("document_collision", -10.0, -1e3, 10.0, "1", "document: of any collision", _DOCUMENT),
+    TaskParam(
+        "sensor_roughness",
+        0.0,
+        0.0,
+        1.0,
+        "1",
+        "vibration and magnetic noise; 1: as in the roughest of five logs",
+        "PX4's logs",
+    ),
 )
 PARAMS = (*FLIGHT_PARAMS, *FOLLOW_PARAMS)
 
@@ -212,7 +222,12 @@ IMPROVED: dict[str, float | Sampler] = {
 }
 # The same, and what `follow-me-tracked` may meet; its velocities shall be smooth, and going back is no sin.
 SEEN_BY_TRACKER: dict[str, float | Sampler] = {
-    "wind_m_s": Sampler(intervals=((0.0, 8.0),)),
+    "wind_m_s": Sampler(intervals=((0.0, 10.0),)),
+    "sensor_roughness": Sampler(intervals=((0.0, 1.0),)),
+    "lens_scale": Sampler(mean=1.0, st_dev=0.02),
+    "lens_tilt_deg": Sampler(mean=0.0, st_dev=1.5),
+    "owner_size": Sampler(intervals=((0.65, 1.15),)),
+    "owner_crouch_fraction": Sampler(mean=0.0, st_dev=0.3),
     "owner_stop_share": Sampler(intervals=((0.1, 0.35),)),
     "owner_course_std_deg": Sampler(intervals=((40.0, 70.0), (40.0, 70.0), (60.0, 120.0))),
     "owner_hides_per_min": Sampler(mean=0.2, st_dev=1.5),

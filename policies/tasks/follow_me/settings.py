@@ -2,9 +2,13 @@
 
 from typing import ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
-from policies.tasks.task import TaskSettings
+from common.airframe import AirframeError, load_airframe
+from policies.tasks.flight.hover_bank import AIRFRAME
+from policies.tasks.flight.settings import RigSettings
+from sim.bodies.body import DEFAULT_BODY
+from sim.bodies.vehicles import class_of
 
 FollowPreset = Literal["as-documented", "improved", "vision-only"]
 Observation = Literal["camera", "tracked", "state"]
@@ -12,10 +16,10 @@ OwnerClass = Literal["walks", "runs", "any"]
 Terrain = Literal["fresh", "kept"]
 
 
-class FollowSettings(TaskSettings):
+class FollowSettings(RigSettings):
     """What a user may choose of FollowMe."""
 
-    conditions: ClassVar = TaskSettings.conditions | {"owner", "has_estimator", "terrain", "image_size"}
+    conditions: ClassVar = RigSettings.conditions | {"owner", "airframe", "terrain", "image_size"}
 
     preset: FollowPreset = "improved"  # type: ignore[assignment]  # tasks have presets of their own
     """`as-documented` (the text), `improved` (ours) or `vision-only` (ours, without any word of where the owner is)."""
@@ -25,9 +29,26 @@ class FollowSettings(TaskSettings):
     owner: OwnerClass = "walks"
     """The owner's fastest: `walks` up to 2 m/s, `runs` up to 5 m/s, or `any` between 1 and 6 m/s, drawn per episode,
     five in eight above 4 m/s."""
-    has_estimator: bool = True
-    """Whether the flight controller flies on its estimate; if not, on the truth: quicker, in training only."""
+    airframe: str = AIRFRAME
+    """Name or TOML file of the multirotor; of several with + between them one is drawn per episode."""
     terrain: Terrain = "fresh"
     """`fresh` hills and trees every episode, or those of the first one `kept`."""
     image_size: int = Field(default=64, ge=8, le=256)
     """Width and height of the camera's image [pixels]."""
+
+    @property
+    def airframes(self) -> tuple[str, ...]:
+        """The names in `airframe`."""
+        return tuple(self.airframe.split("+"))
+
+    @field_validator("airframe")
+    @classmethod
+    def _hovers(cls, airframe: str) -> str:
+        for name in airframe.split("+"):
+            try:
+                body = class_of(load_airframe(name)).body
+            except AirframeError as error:
+                raise ValueError(str(error)) from None
+            if body is not DEFAULT_BODY:
+                raise ValueError(f"{name} is no multirotor, and cannot hover")
+        return airframe

@@ -14,6 +14,7 @@ from common.kernels import FRAME_TICKS, TICK_S
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
 from policies.tasks.flight.hover_bank import PLAIN
 from policies.tasks.flight.rig_task import RigTask
+from policies.tasks.flight.settings import RigSettings
 from policies.tasks.hover.hover_kernels import (
     PARAMS,
     POINT_NED,
@@ -26,7 +27,6 @@ from policies.tasks.hover.hover_kernels import (
     prepare,
 )
 from policies.tasks.layout import Element, Layout
-from policies.tasks.task import TaskSettings
 from policies.tasks.task_params import typed_rows
 from policies.tasks.top_view import GOAL, VEHICLE, Canvas
 from sim.world.world import build_world
@@ -34,15 +34,11 @@ from sim.world.world import build_world
 HoverPreset = Literal["improved"]
 
 
-class HoverSettings(TaskSettings):
+class HoverSettings(RigSettings):
     """What a user may choose of Hover."""
-
-    conditions: ClassVar = TaskSettings.conditions | {"has_estimator"}
 
     preset: HoverPreset = "improved"
     """`improved`: ours, the only one; no document describes this task."""
-    has_estimator: bool = True
-    """Whether the flight controller flies on its estimate; if not, on the truth: quicker, in training only."""
 
 
 ACTIONS = (
@@ -73,6 +69,7 @@ class Hover(RigTask):
             has_estimator=settings.has_estimator,
             number_defaults={},
             device=device,
+            split=settings.split,
         )
         self.settings = settings
         state = HoverState()
@@ -80,7 +77,7 @@ class Hover(RigTask):
         state.params = typed_rows(self.buffers.params, HoverParams, first=len(FLIGHT_PARAMS))
         state.actions = self._zeros("last_actions", env_count, wp.vec4)
         state.has_estimator = int(settings.has_estimator)
-        start = self.start(is_test=settings.split == "test")
+        start = self.start()
         self._starting: NDArray[np.bool_] = self.is_starting.numpy()  # live on a CPU
         buffers, rig = self.buffers, self.rig.arrays
         self._act = self.record(act, buffers, rig, state)

@@ -62,7 +62,8 @@ class Navigate(FlightTask):
             has_estimator=settings.has_estimator,
             number_defaults=self.number_defaults,
             device=device,
-            **self._vehicle(settings.has_estimator, device),
+            split=settings.split,
+            **self._vehicle(settings, device),
         )
         self.settings = settings
         self._delay_ticks = round(settings.delay_ms / (1000.0 * TICK_S))
@@ -73,7 +74,7 @@ class Navigate(FlightTask):
             self._eyes = DepthEyes(self.buffers, self.rig.arrays, self.navigation.params, self.worlds)
         self._record_all()
 
-    def _vehicle(self, has_estimator: bool, device: str) -> dict[str, Any]:  # noqa: ARG002
+    def _vehicle(self, settings: NavigateSettings, device: str) -> dict[str, Any]:  # noqa: ARG002
         """What the rig is made from, where it is not the drone."""
         return {}
 
@@ -151,7 +152,7 @@ class Navigate(FlightTask):
         rules.has_rays = int(self.settings.observation == "rays")
         rules.has_estimator = int(self.settings.has_estimator)
         rules.decision_s = self.decision_s
-        start = self.start(is_test=self.settings.split == "test")
+        start = self.start()
 
         record = self.record
         commands = wp.zeros(self.env_count, dtype=Command, device=self.device)  # of the running decision
@@ -173,9 +174,9 @@ class NavigateRover(Navigate):
     world: ClassVar = WALLED_FOREST
     number_defaults: ClassVar = ROVER
 
-    def _vehicle(self, has_estimator: bool, device: str) -> dict[str, Any]:
-        bank = standing_bank(ROVER_AIRFRAME, sensor_model, has_estimator, device)
-        return {"airframe_name": ROVER_AIRFRAME, "bank": bank}
+    def _vehicle(self, settings: NavigateSettings, device: str) -> dict[str, Any]:
+        bank = standing_bank(ROVER_AIRFRAME, sensor_model, settings.has_estimator, device, settings.split)
+        return {"airframes": (ROVER_AIRFRAME,), "bank": bank}
 
 
 def _layout(name: str, settings: NavigateSettings) -> Layout:

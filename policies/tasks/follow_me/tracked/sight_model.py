@@ -33,6 +33,7 @@ _EPISODE_STREAM = wp.constant(22)
 _ALONG_BIAS_M = wp.constant(0.05)  # standard deviation from episode to episode, with depth
 _ALONG_M, _ALONG_FRACTION = wp.constant(0.045), wp.constant(0.01)
 _COLOUR_BIAS, _COLOUR_FRACTION = wp.constant(0.12), wp.constant(0.13)  # of the range by colours alone
+_RADIANS = wp.constant(0.0174532925)
 _ACROSS_RAD, _ACROSS_BIAS_RAD = wp.constant(0.016), wp.constant(0.01)
 _DOWN_BIAS_M, _DOWN_M = wp.constant(0.1), wp.constant(0.09)
 _MISS = wp.constant(0.01)
@@ -123,6 +124,8 @@ def sight_drawn(
         along = level_m * (bias + noise * _COLOUR_FRACTION * wp.randn(state))
     aside = level_m * (_ACROSS_BIAS_RAD * wp.randn(fixed) + noise * _ACROSS_RAD * wp.randn(state))
     down = _DOWN_BIAS_M * wp.randn(fixed) + _DOWN_M * wp.randn(state)
+    aside += p[1] * (1.0 / n.lens_scale - 1.0)  # where a lens shows them that is taken for the usual one
+    down += level_m * wp.tan(n.lens_tilt_deg * _RADIANS)
     out = p * (1.0 + wp.max(along / level_m, -0.5)) + wp.vec3(-p[1] / level_m * aside, p[0] / level_m * aside, down)
     if wp.randf(state) < _STRAY:
         out += wp.vec3(_STRAY_M * wp.randn(state), _STRAY_M * wp.randn(state), 0.0)

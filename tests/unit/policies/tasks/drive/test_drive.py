@@ -142,10 +142,9 @@ def test_every_goal_of_a_car_park_is_a_free_spot_along_which_it_points(split):
         assert room(-outs[i] * 0.75) < 0.1  # the wall behind it
 
 
-def test_training_and_test_worlds_have_no_seed_in_common():
-    seeds = [built("park", 24, split=split).world_seeds.numpy() for split in ("train", "test")]
-    assert np.all(seeds[0] % 2 == 0)
-    assert np.all(seeds[1] % 2 == 1)
+def test_training_validation_and_test_worlds_have_no_seed_in_common():
+    for split, divisor, left in (("train", 4, 0), ("validation", 4, 2), ("test", 2, 1)):
+        assert np.all(built("park", 24, split=split).world_seeds.numpy() % divisor == left)
 
 
 def test_a_goal_of_the_course_has_room_on_ground_that_is_not_steep():

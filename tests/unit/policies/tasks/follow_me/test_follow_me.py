@@ -232,11 +232,11 @@ def test_measures_are_the_truth_about_the_owner() -> None:
     assert (np.abs(measures["bearing_rad"]) <= math.pi).all()
 
 
-def test_training_and_test_episodes_draw_from_disjoint_worlds_and_paths() -> None:
-    for split, parity in (("train", 0), ("test", 1)):
+def test_training_validation_and_test_episodes_draw_from_disjoint_worlds_and_paths() -> None:
+    for split, divisor, left in (("train", 4, 0), ("validation", 4, 2), ("test", 2, 1)):
         task = _task(6, split=split, **STATE)
         for seeds in (task.world_seeds, task.follow.path_seeds, task.noise_seeds):
-            assert (seeds.numpy() % 2 == parity).all()
+            assert (seeds.numpy() % divisor == left).all()
             assert len(set(seeds.numpy().tolist())) == 6
 
 

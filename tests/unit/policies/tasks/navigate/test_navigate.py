@@ -198,11 +198,11 @@ def test_measures_are_the_truth_about_the_way() -> None:
     assert (measures["start_distance_m"] > 55.0).all()
 
 
-def test_training_and_test_episodes_draw_from_disjoint_worlds() -> None:
-    for split, parity in (("train", 0), ("test", 1)):
+def test_training_validation_and_test_episodes_draw_from_disjoint_worlds() -> None:
+    for split, divisor, left in (("train", 4, 0), ("validation", 4, 2), ("test", 2, 1)):
         task = _task(6, split=split, **QUICK)
         for seeds in (task.world_seeds, task.noise_seeds):
-            assert (seeds.numpy() % 2 == parity).all()
+            assert (seeds.numpy() % divisor == left).all()
             assert len(set(seeds.numpy().tolist())) == 6
 
 

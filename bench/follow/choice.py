@@ -1,0 +1,51 @@
+"""`python -m bench.follow.choice POLICY…`: which of some policies without images is best, by worlds of validation.
+
+In: policy files of FollowMe with `observation=tracked`, such as the checkpoints of several seeds. Out: how long each
+stays in the band in what it was trained in, under the guard's rule of the owner, with 95 % intervals, best first by
+where the interval begins. The episodes, of split `validation`, are neither trained on nor flown in a test.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from bench.follow.judge import first_episodes
+from policies.learn.export.policy_file import load_policy
+from policies.tasks.catalogue import task_settings
+from policies.tasks.follow_me.follow_me import FollowMe
+from policies.tasks.follow_me.scorecard import Scorecard, scorecard, written
+from policies.tasks.follow_me.settings import FollowSettings
+
+WIDE = "x500+f450+f550"
+
+
+def main(
+    policies: list[Path],
+    airframe: Annotated[str, typer.Option(help="Of several with + between them one is drawn per episode.")] = WIDE,
+    episodes: Annotated[int, typer.Option(min=2, help="Of each policy.")] = 256,
+) -> None:
+    found = {path: judged(path, airframe, episodes) for path in track(policies, "judging", transient=True)}
+    table = Table("policy", "in band", "collided")
+    for path, card in sorted(found.items(), key=lambda pair: -pair[1].in_band.low):
+        table.add_row(str(path), written(card.in_band, "%"), written(card.collision, "%"))
+    Console().print(table)
+
+
+def judged(path: Path, airframe: str, episodes: int) -> Scorecard:
+    """A policy in worlds of validation, on the flight controller's estimate."""
+    policy, card = load_policy(path)
+    changed = {"split": "validation", "airframe": airframe, "has_estimator": "true", "terrain": "fresh"}
+    settings = task_settings("FollowMe", {key: str(value) for key, value in card.settings.items()} | changed)
+    assert isinstance(settings, FollowSettings)
+    task = FollowMe(settings, episodes)
+    task.layout.require(policy.layout, str(path))
+    tracks, _ = first_episodes(policy, task, {})
+    return scorecard(tracks)
+
+
+if __name__ == "__main__":
+    typer.run(main)
