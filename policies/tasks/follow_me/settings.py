@@ -30,7 +30,7 @@ class FollowSettings(RigSettings):
     """The owner's fastest: `walks` up to 2 m/s, `runs` up to 5 m/s, or `any` between 1 and 6 m/s, drawn per episode,
     five in eight above 4 m/s."""
     airframe: str = AIRFRAME
-    """Name or TOML file of the multirotor; of several with + between them one is drawn per episode."""
+    """Name or TOML file of what flies; of several with + between them one is drawn per episode."""
     terrain: Terrain = "fresh"
     """`fresh` hills and trees every episode, or those of the first one `kept`."""
     image_size: int = Field(default=64, ge=8, le=256)
@@ -50,5 +50,5 @@ class FollowSettings(RigSettings):
             except AirframeError as error:
                 raise ValueError(str(error)) from None
             if body is not DEFAULT_BODY:
-                raise ValueError(f"{name} is no multirotor, and cannot hover")
+                raise ValueError(f"{name} cannot hover")
         return airframe

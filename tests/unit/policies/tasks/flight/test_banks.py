@@ -56,7 +56,7 @@ def test_of_several_airframes_each_is_as_frequent_and_flies_by_parameters_of_its
     assert np.abs(truth["vel_ned"]).max() < 0.5
 
 
-@pytest.mark.parametrize(("name", "word"), [("x9000", "unknown airframe"), ("x500+rover", "no multirotor")])
-def test_what_is_no_multirotor_is_refused(name, word):
+@pytest.mark.parametrize(("name", "word"), [("x9000", "unknown airframe"), ("x500+rover", "rover cannot hover")])
+def test_what_cannot_hover_is_refused(name, word):
     with pytest.raises(UnknownTask, match=word):
         follow(airframe=name)
