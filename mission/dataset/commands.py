@@ -1,4 +1,4 @@
-"""The commands of `honeyguide dataset`: build, collect, show, judge, model, merge, split, filter, export."""
+"""The commands of `honeyguide dataset`: build, collect, show, judge, model, fit, merge, split, filter, export."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -168,6 +168,26 @@ def model(
         except (DemonstrationError, ModelError) as error:
             raise DatasetError(str(error)) from error
         typer.echo(f"{output}: explains {100 * (1 - made.networks.held_out):.1f} % of held-out variance")
+
+
+@app.command()
+def fit(
+    sources: Annotated[list[Path], typer.Argument(help="ULogs of one vehicle, folders of runs, or folders of those.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The airframe's file to make: .toml.")],
+    airframe: Annotated[str, typer.Option(help="What to begin with: an airframe's name or TOML file.")] = "x500",
+    mass: Annotated[
+        float | None, typer.Option(min=0.01, max=1000.0, help="What the vehicle weighs [kg], which no log tells.")
+    ] = None,
+    picture: Annotated[Path | None, typer.Option(help="Write what was predicted and logged as a PNG.")] = None,
+) -> None:
+    """Fit the simulator's numbers of an airframe to logged flights."""
+    if output.suffix != ".toml":
+        refuse(f"-o {output}: an airframe's file ends with .toml")
+    with _refusing():
+        with loading(Console()):
+            from mission.dataset.fit.fit_logs import FitOptions, fit_logs
+
+        fit_logs(FitOptions(tuple(sources), airframe, output, mass, picture), Console())
 
 
 @app.command()
