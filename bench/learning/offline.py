@@ -68,7 +68,7 @@ def random_return() -> float:
     return scores.return_sum / scores.episode_count
 
 
-def built(trainer: str, store: OfflineStore, hidden: int = HIDDEN) -> tuple[Policy, OfflineAlgorithm]:
+def built(trainer: str, store: OfflineStore, hidden: int = HIDDEN, seed: int = 0) -> tuple[Policy, OfflineAlgorithm]:
     """An untrained policy, and the algorithm that trains it."""
     behavior = Behavior.model_validate(
         {
@@ -77,11 +77,11 @@ def built(trainer: str, store: OfflineStore, hidden: int = HIDDEN) -> tuple[Poli
             "network_settings": {"hidden_units": hidden, "normalize": True},
         }
     )
-    policy = Policy(store.layout, behavior.network_settings, torch.Generator().manual_seed(0), is_squashed=True)
+    policy = Policy(store.layout, behavior.network_settings, torch.Generator().manual_seed(seed), is_squashed=True)
     statistics = store.statistics()
     assert policy.body.normalizer is not None
     policy.body.normalizer.take(statistics.mean, statistics.variance, len(store.rows))
-    return policy, build_algorithm(behavior, policy, store, seed=0)
+    return policy, build_algorithm(behavior, policy, store, seed=seed)
 
 
 def _recorded(folder: Path, quality: str) -> OfflineStore:

@@ -2,8 +2,9 @@
 
 Both learn from the same datasets, ours from its folder, d3rlpy from its D4RL export, the same networks (2 layers,
 swish) with the same batches, discount, rates and steps, on one thread. Each policy then plays the same episodes in our
-batch simulator. d3rlpy is in an environment of its own (`pip install torch d3rlpy h5py`). A row that is in
-docs/results/offline-d3rlpy.jsonl already is not measured again, unless it is of other sizes.
+batch simulator. d3rlpy is in an environment of its own (`pip install torch d3rlpy h5py`). All rows of one seed come
+before those of the next. A seed of a row that is in docs/results/offline-d3rlpy.jsonl already is not measured again,
+unless it is of other sizes.
 """
 
 import json
@@ -20,7 +21,7 @@ from rich.console import Console
 
 from bench.learning.offline import built
 from bench.offline_d3rlpy.cases import CASES, QUALITIES, Case, collected
-from bench.offline_d3rlpy.page import RESULTS, write_section
+from bench.offline_d3rlpy.page import MOST_SEEDS, RESULTS, write_section
 from bench.row import require
 from common.files import write_whole
 from policies.datasets.exporting import export_d4rl
@@ -35,6 +36,8 @@ from policies.tasks.catalogue import settings_of
 TRAINERS = ("iql", "td3_bc")
 BATCH, GAMMA, BLOCK = 256, 0.99, 200
 EVALUATION_SEED = 11
+OF_SEEDS = ("scores", "d3rlpy_scores", "cpu_s", "d3rlpy_cpu_s")
+"""What a row has a list of, a value for each seed from 0 on."""
 
 
 def main(
@@ -43,6 +46,7 @@ def main(
     steps: Annotated[int, typer.Option(min=200, help="Gradient steps of each training.")] = 5_000,
     hidden: Annotated[int, typer.Option(min=1, help="Units of each of two layers.")] = 64,
     episodes: Annotated[int, typer.Option(min=1, help="Judged episodes of each policy.")] = 100,
+    seeds: Annotated[int, typer.Option(min=1, max=MOST_SEEDS, help="Trainings of each row by both.")] = 3,
     folder: Annotated[Path, typer.Option(help="Where datasets lie.")] = Path("results/offline-d3rlpy"),
 ) -> None:
     """Collects, trains, judges, and writes the rows and their section of docs/results/offline.md."""
@@ -51,13 +55,14 @@ def main(
     if unknown := [name for name in case or () if name not in CASES]:
         raise typer.BadParameter(f"no case {unknown[0]}; there are {', '.join(CASES)}", param_hint="--case")
     sizes = {"steps": steps, "hidden": hidden, "episodes": episodes}
-    for name, trainer, quality in product(case or CASES, TRAINERS, QUALITIES):
+    for seed, name, trainer, quality in product(range(seeds), case or CASES, TRAINERS, QUALITIES):
         key = {"case": name, "quality": quality, "trainer": trainer}
-        if any(row.items() >= (key | sizes).items() for row in _rows()):
+        row = next((row for row in _rows() if row.items() >= (key | sizes).items()), key | sizes)
+        if len(row.get("scores", ())) > seed:
             continue
-        row = key | sizes | _measured(CASES[name], trainer, quality, folder / name, sizes, d3rlpy_python, console)
-        kept = [other for other in _rows() if not other.items() >= key.items()]
-        write_whole(RESULTS, "".join(f"{json.dumps(each)}\n" for each in [*kept, row]).encode())
+        found = _measured(CASES[name], trainer, quality, folder / name, sizes | {"seed": seed}, d3rlpy_python, console)
+        row = row | found | {each: [*row.get(each, ()), found[each]] for each in OF_SEEDS}
+        write_whole(RESULTS, "".join(f"{json.dumps(each)}\n" for each in _with(row, list(key))).encode())
         console.print(row)
     write_section(_rows())
 
@@ -66,10 +71,17 @@ def _rows() -> list[dict[str, Any]]:
     return [json.loads(line) for line in RESULTS.read_text(encoding="utf-8").splitlines()] if RESULTS.exists() else []
 
 
+def _with(row: dict[str, Any], names: list[str]) -> list[dict[str, Any]]:
+    """All rows, with this one in place of the one that is alike in these names, or at the end."""
+    rows = _rows()
+    places = [k for k, other in enumerate(rows) if all(other[name] == row[name] for name in names)]
+    return [*rows[: places[0]], row, *rows[places[0] + 1 :]] if places else [*rows, row]
+
+
 def _measured(
     case: Case, trainer: str, quality: str, folder: Path, sizes: dict[str, int], python: Path, console: Console
 ) -> dict[str, Any]:
-    """Scores and times of both."""
+    """Scores and times of both, of one seed."""
     folder.mkdir(parents=True, exist_ok=True)
     dataset = collected(case, quality, folder, console)
     references = [_mean_return(collected(case, each, folder, console)) for each in ("random", "best")]
@@ -78,15 +90,17 @@ def _measured(
     theirs, their_s, notes = _theirs(trainer, store, dataset, sizes, python)
     settings = settings_of(case.task, case.env_args)
     returns = [
-        evaluate(policy, case.task, settings, episodes=sizes["episodes"], seed=EVALUATION_SEED).mean_return
+        evaluate(
+            policy, case.task, settings, episodes=sizes["episodes"], seed=EVALUATION_SEED, params=case.numbers
+        ).mean_return
         for policy in (ours, theirs)
     ]
     scores = [normalized_score(value, references) for value in (*returns, _mean_return(dataset))]
     return {
         "decisions": len(store),
         **notes,
-        "score": round(scores[0], 2),
-        "d3rlpy_score": round(scores[1], 2),
+        "scores": round(scores[0], 2),
+        "d3rlpy_scores": round(scores[1], 2),
         "dataset_score": round(scores[2], 2),
         "cpu_s": round(our_s, 2),
         "d3rlpy_cpu_s": round(their_s, 2),
@@ -99,8 +113,8 @@ def _mean_return(dataset: Path) -> float:
 
 
 def _ours(trainer: str, store: OfflineStore, sizes: dict[str, int]) -> tuple[Policy, float]:
-    policy, algorithm = built(trainer, store, sizes["hidden"])
-    draws, generator = Draws(store, BATCH, 1, 1.0), torch.Generator().manual_seed(0)
+    policy, algorithm = built(trainer, store, sizes["hidden"], sizes["seed"])
+    draws, generator = Draws(store, BATCH, 1, 1.0), torch.Generator().manual_seed(sizes["seed"])
     start_s = time.process_time()
     for first in range(0, sizes["steps"], BLOCK):
         for rows in draws.block(min(BLOCK, sizes["steps"] - first), generator):
@@ -122,7 +136,7 @@ def _theirs(
     job, out = dataset.with_suffix(".json"), dataset.with_suffix(".npz").absolute()
     record = {
         "trainer": trainer, "dataset": str(exported.absolute()), "out": str(out), "steps": sizes["steps"],
-        "hidden": sizes["hidden"], "batch": BATCH, "gamma": GAMMA, "seed": 0, "limit": LIMIT,
+        "hidden": sizes["hidden"], "batch": BATCH, "gamma": GAMMA, "seed": sizes["seed"], "limit": LIMIT,
         "mean": normalizer.mean.tolist(), "deviation": normalizer.deviation.tolist(),
     }  # fmt: skip
     write_whole(job, json.dumps(record).encode())

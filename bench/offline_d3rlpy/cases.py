@@ -5,7 +5,8 @@ one after the other, as a learner's replay has them. Parking1's actions are choi
 IQL has; Drive's parking is the nearest task that both can learn.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rich.console import Console
@@ -25,6 +26,8 @@ class Case:
     pilot: str
     env_args: tuple[str, ...]
     episodes: int
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    """Of the task, in place of its own."""
 
 
 CASES = {
@@ -34,6 +37,7 @@ CASES = {
         "follow-me-tracked",
         ("observation=tracked", "has_estimator=false", "owner=any", "terrain=kept", "stack=3"),
         60,
+        {"collision_cost": 80.0, "lost_cost": 40.0, "jerk_cost": 0.2},  # else who trembles gains by losing the owner
     ),
     "navigate": Case("Navigate", "navigate", ("has_estimator=false",), 100),
     "drive-park": Case("Drive", "drive-park", ("preset=park",), 100),
@@ -52,7 +56,8 @@ def collected(case: Case, quality: str, folder: Path, console: Console) -> Path:
         part = out if len(noises) == 1 else folder / f"{quality}-{k}"
         if not part.exists():
             count = case.episodes // len(noises)
-            collect_dataset(CollectOptions(case.task, pilot, count, part, noise, k, case.env_args), console)
+            options = CollectOptions(case.task, pilot, count, part, noise, k, case.env_args, numbers=case.numbers)
+            collect_dataset(options, console)
         parts.append(part)
     if len(parts) > 1:
         merge(parts, out)

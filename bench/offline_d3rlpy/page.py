@@ -1,6 +1,8 @@
 """The section of docs/results/offline.md that shows our offline training beside d3rlpy's."""
 
+import textwrap
 from pathlib import Path
+from statistics import fmean, stdev
 from typing import Any
 
 from bench.page_section import with_section
@@ -10,16 +12,68 @@ PAGE = Path(__file__).parents[2] / "docs" / "results" / "offline.md"
 RESULTS = PAGE.with_name("offline-d3rlpy.jsonl")
 HEADING = "## Beside d3rlpy"
 _NAMES = {"iql": "IQL", "td3_bc": "TD3+BC"}
+_STUDENT = {2: 4.303, 3: 2.776, 4: 2.447, 5: 2.306}
+"""Two-sided 95 % of Student's t for the difference of two means of so many seeds each, of 2 (seeds - 1) degrees."""
+MOST_SEEDS = max(_STUDENT)
+WIDTH = 120
+
+
+def difference(row: dict[str, Any]) -> tuple[float, float, float]:
+    """Our mean score less d3rlpy's, and its 95 % interval over the seeds; one seed has none, which is all numbers."""
+    ours, theirs = row["scores"], row["d3rlpy_scores"]
+    apart = fmean(ours) - fmean(theirs)
+    if len(ours) < 2:
+        return apart, float("-inf"), float("inf")
+    half = _STUDENT[len(ours)] * ((stdev(ours) ** 2 + stdev(theirs) ** 2) / len(ours)) ** 0.5
+    return apart, apart - half, apart + half
+
+
+def _mean(values: list[float]) -> str:
+    return f"{fmean(values):.1f}" + (f" ± {stdev(values):.1f}" if len(values) > 1 else "")
+
+
+def _apart(row: dict[str, Any]) -> str:
+    apart, low, high = difference(row)
+    return f"{apart:+.1f}" + (f" ({low:.1f} to {high:.1f})" if len(row["scores"]) > 1 else "")
+
+
+def _ratio(row: dict[str, Any]) -> float:
+    return sum(row["d3rlpy_cpu_s"]) / sum(row["cpu_s"])
+
+
+def _verdict(rows: list[dict[str, Any]]) -> str:
+    """In how many rows we are at least as good, and what the others are."""
+    of_each = " and ".join(
+        f"{sum(difference(row)[0] >= 0.0 for row in of)} of {len(of)} with {_NAMES[name]}"
+        for name in _NAMES
+        if (of := [row for row in rows if row["trainer"] == name])
+    )
+    less = [row for row in rows if difference(row)[0] < 0.0]
+    told = [row for row in less if len(row["scores"]) > 1]
+    beyond = sum(difference(row)[2] < 0.0 for row in told)
+    better = sum(difference(row)[1] > 0.0 for row in rows)
+    return (
+        f"Our mean score is at least d3rlpy's in {len(rows) - len(less)} of {len(rows)} rows: {of_each}. Of the other "
+        f"{len(less)}, {len(told) - beyond} are within noise, {beyond} below it, and {len(less) - len(told)} of one "
+        f"seed alone, which has no interval; {better} of all rows are above it. Noise is the 95 % interval of the "
+        "difference (Student's, over the seeds of both), which few seeds leave wide."
+    )
 
 
 def write_section(rows: list[dict[str, Any]]) -> None:
     """Writes it, in place of the one that is there."""
     version, steps, hidden = rows[0]["d3rlpy"], rows[0]["steps"], rows[0]["hidden"]
-    ratios = {name: [row["d3rlpy_cpu_s"] / row["cpu_s"] for row in rows if row["trainer"] == name] for name in _NAMES}
+    ratios = {name: [_ratio(row) for row in rows if row["trainer"] == name] for name in _NAMES}
     spans = " and ".join(
         f"{min(found):.1f} to {max(found):.1f} times for {_NAMES[name]}" for name, found in ratios.items() if found
     )
-    wins = sum(row["score"] >= row["d3rlpy_score"] for row in rows)
+    text = (
+        f"d3rlpy {version} and we learn from the same datasets (`bench/offline_d3rlpy/cases.py`; d3rlpy from their "
+        f"D4RL export): {steps:,} gradient steps of 256 decisions, 2 layers of {hidden}, swish, discount 0.99, Adam at "
+        "3e-4, one thread. A row is as many trainings by both as it has seeds; scores are their means and deviations, "
+        "0 at random actions and 100 at the pilot without noise. Times are of the processor, for the gradient steps "
+        f"alone; d3rlpy takes longer than we do, {spans}. {_verdict(rows)}"
+    )
     lines = [
         HEADING,
         "",
@@ -28,21 +82,17 @@ def write_section(rows: list[dict[str, Any]]) -> None:
         ".venv/bin/python -m bench.offline_d3rlpy --d3rlpy-python d3rlpy-env/bin/python",
         "```",
         "",
-        f"d3rlpy {version} and we learn from the same datasets (`bench/offline_d3rlpy/cases.py`; d3rlpy from their",
-        f"D4RL export): {steps:,} gradient steps of 256 decisions, 2 layers of {hidden}, swish, discount 0.99, Adam at",
-        "3e-4, one thread, one seed. Scores are 0 at random actions and 100 at the pilot without noise. Times are",
-        "of the processor, for the gradient steps alone, in one run; d3rlpy takes longer than we do,",
-        f"{spans}. Our score is at least d3rlpy's in {wins} of {len(rows)} rows.",
+        *textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False),
         "",
-        "| dataset | learnt by | its score | ours | d3rlpy | time, d3rlpy / ours |",
-        "|---|---|---|---|---|---|",
+        "| dataset | learnt by | its score | seeds | ours | d3rlpy | ours less d3rlpy | time, d3rlpy / ours |",
+        "|---|---|---|---|---|---|---|---|",
     ]
-    for row in rows:
-        ratio = row["d3rlpy_cpu_s"] / row["cpu_s"]
-        lines.append(
-            f"| {row['case']}, {row['quality']} | {_NAMES[row['trainer']]} | {row['dataset_score']:.1f} "
-            f"| {row['score']:.1f} | {row['d3rlpy_score']:.1f} | {ratio:.1f} |"
-        )
+    lines += [
+        f"| {row['case']}, {row['quality']} | {_NAMES[row['trainer']]} | {row['dataset_score']:.1f} "
+        f"| {len(row['scores'])} | {_mean(row['scores'])} | {_mean(row['d3rlpy_scores'])} | {_apart(row)} "
+        f"| {_ratio(row):.1f} |"
+        for row in sorted(rows, key=lambda row: list(_NAMES).index(row["trainer"]))
+    ]
     lines += [
         "",
         "What differs: d3rlpy leaves out the last decision of an episode that was cut, since it does not keep what",

@@ -1,12 +1,12 @@
 """Episodes of the batch simulator written as one dataset, by a policy, an expert or chance."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mission.train.play import PlayOptions, cast
 from policies.datasets.collecting import NoisyDriver, collected
-from policies.datasets.episodes import DatasetError, DatasetOrigin
+from policies.datasets.episodes import NUMBER_NOTE, DatasetError, DatasetOrigin
 from policies.datasets.writer import DatasetWriter
 from policies.experts.episode_recording import MAX_ROWS
 from policies.tasks.catalogue import settings_of
@@ -28,6 +28,8 @@ class CollectOptions:
     shards: int | None = None
     jobs: int | None = None
     ray: str | None = None
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    """Of the task, in place of its own; not of shards."""
 
 
 def write_episodes(options: CollectOptions, note: Callable[[int], None] = lambda _: None) -> None:
@@ -35,6 +37,7 @@ def write_episodes(options: CollectOptions, note: Callable[[int], None] = lambda
 
     Raises:
         UnknownTask, NoExpert, PlayError, LayoutError: the task, its settings or the policy cannot be used.
+        NumberError: a number that the task has not.
         DatasetError: the task shows images, or the dataset cannot be written.
         DemonstrationFileError: the same.
     """
@@ -53,9 +56,11 @@ def write_episodes(options: CollectOptions, note: Callable[[int], None] = lambda
     task, driver, name = cast(played)
     if task.layout.image is not None:
         raise DatasetError(f"{task.layout.task}: shows images as it is set, and datasets of episodes hold none")
+    task.set_params(options.numbers)
+    notes = {f"{NUMBER_NOTE}{name}": f"{value:g}" for name, value in options.numbers.items()}
     settings = getattr(task, "settings", None) or settings_of(options.task, options.env_args)
     pilot = (Path(name).stem if is_named else options.policy) + (f"-noise-{options.noise:g}" if options.noise else "")
-    origin = DatasetOrigin(task.layout, settings.model_dump(mode="json"), pilot, options.seed)
+    origin = DatasetOrigin(task.layout, settings.model_dump(mode="json"), pilot, options.seed, notes=notes)
     noisy = NoisyDriver(driver, options.noise, options.seed)
     with DatasetWriter(options.out, origin) as writer:
         writer.add_all(collected(task, noisy, options.episodes, options.seed, note))

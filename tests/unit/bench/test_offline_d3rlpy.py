@@ -7,12 +7,13 @@ from rich.console import Console
 
 from bench.offline_d3rlpy import cases, page
 from policies.datasets.exporting import export_d4rl
+from policies.datasets.reader import DatasetReader
 from policies.offline.store import open_store
 
 ROW = {
     "case": "hover", "quality": "expert", "trainer": "iql", "steps": 5000, "hidden": 64, "episodes": 100,
-    "decisions": 500, "d3rlpy_decisions": 495, "d3rlpy": "2.8.1", "score": 90.0, "d3rlpy_score": 80.0,
-    "dataset_score": 95.0, "cpu_s": 10.0, "d3rlpy_cpu_s": 31.0, "references": [0.0, 1.0],
+    "decisions": 500, "d3rlpy_decisions": 495, "d3rlpy": "2.8.1", "scores": [90.0], "d3rlpy_scores": [80.0],
+    "dataset_score": 95.0, "cpu_s": [10.0], "d3rlpy_cpu_s": [31.0], "references": [0.0, 1.0],
 }  # fmt: skip
 
 
@@ -21,13 +22,40 @@ def test_the_section_takes_the_place_of_the_one_that_is_there(tmp_path, monkeypa
     target.write_text("# Title\n\n## First\n\ntext\n")
     monkeypatch.setattr(page, "PAGE", target)
     page.write_section([ROW])
-    page.write_section([ROW, ROW | {"trainer": "td3_bc", "score": 70.0}])
+    worse = {"trainer": "td3_bc", "scores": [70.0, 72.0, 74.0], "d3rlpy_scores": [80.0, 80.0, 83.0]}
+    within = {"trainer": "td3_bc", "quality": "replay", "scores": [70.0, 90.0], "d3rlpy_scores": [75.0, 90.0]}
+    page.write_section([ROW, ROW | worse, ROW | within])
     text = target.read_text()
     assert text.count(page.HEADING) == 1
     assert "## First\n\ntext" in text
-    assert "| hover, expert | IQL | 95.0 | 90.0 | 80.0 | 3.1 |" in text
-    assert "in 1 of 2 rows" in text
+    assert "| hover, expert | IQL | 95.0 | 1 | 90.0 | 80.0 | +10.0 | 3.1 |" in text
+    assert "| hover, expert | TD3+BC | 95.0 | 3 | 72.0 ± 2.0 | 81.0 ± 1.7 | -9.0 (-13.2 to -4.8) | 3.1 |" in text
+    words = " ".join(text.split())
+    assert (
+        "in 1 of 3 rows: 1 of 1 with IQL and 0 of 2 with TD3+BC. Of the other 2, 1 are within noise, 1 below" in words
+    )
     assert max(map(len, text.splitlines())) < 125
+
+
+def test_the_interval_of_a_difference_is_students():
+    apart, low, high = page.difference({"scores": [1.0, 3.0], "d3rlpy_scores": [0.0, 2.0]})
+    assert apart == 1.0
+    assert low == pytest.approx(1.0 - 4.303 * 2.0**0.5)  # both have a variance of 2, of 2 seeds each
+    assert high == pytest.approx(1.0 + 4.303 * 2.0**0.5)
+    assert page.difference({"scores": [1.0], "d3rlpy_scores": [0.0]}) == (1.0, float("-inf"), float("inf"))
+
+
+def test_a_dataset_is_paid_by_the_numbers_of_its_case(tmp_path):
+    returns = []
+    for cost in (0.0, 10.0):
+        folder = tmp_path / f"{cost:g}"
+        folder.mkdir()
+        case = cases.Case("Hover", "random", ("has_estimator=false",), 4, {"rate_cost": cost})
+        dataset = cases.collected(case, "best", folder, Console(quiet=True))
+        returns.append(open_store([str(dataset)]).episode_returns())
+        with DatasetReader(dataset) as reader:
+            assert reader.origin.notes == {"number rate_cost": f"{cost:g}"}
+    assert (returns[0] > returns[1]).all()
 
 
 @pytest.mark.parametrize("quality", ["medium", "replay"])
