@@ -1,7 +1,8 @@
 """`python theirs.py JOB.json`: trains with d3rlpy what the job says. It runs in d3rlpy's environment, without ours.
 
 In: a D4RL file of `honeyguide dataset export`, how observations are normalised, sizes. Out: an .npz of the policy's
-weights, layer by layer, and the processor's time for the gradient steps alone.
+weights, layer by layer, and the processor's time for the gradient steps alone. Of minibatches in place of a dataset it
+makes one step each, and tells all weights before and after.
 """
 
 import json
@@ -23,6 +24,9 @@ def main(job: dict[str, Any]) -> None:
     torch.set_num_threads(1)
     d3rlpy.seed(job["seed"])
     algorithm = _algorithm(job)
+    if "batches" in job:
+        np.savez(job["out"], **_stepped(algorithm, job))
+        return
     dataset = _dataset(job)
     algorithm.build_with_dataset(dataset)
     start_s = time.process_time()
@@ -41,6 +45,36 @@ def main(job: dict[str, Any]) -> None:
     np.savez(job["out"], spent_s=spent_s, decisions=dataset.transition_count, version=d3rlpy.__version__, **found)
 
 
+def _stepped(algorithm: Any, job: dict[str, Any]) -> dict[str, Any]:
+    """All weights before and after."""
+    with np.load(job["batches"]) as file:
+        arrays = {name: torch.from_numpy(file[name]) for name in file.files}
+    algorithm.create_impl(tuple(arrays["observations"].shape[1:]), arrays["actions"].shape[1])
+    size = job["batch"]
+    found = _weights(algorithm.impl, "start")
+    for k in range(len(arrays["actions"]) // size):
+        rows = {name: array[k * size : (k + 1) * size] for name, array in arrays.items()}
+        others = {
+            "next_actions": rows["actions"],
+            "returns_to_go": torch.zeros(size, 1),
+            "intervals": torch.ones(size, 1),
+        }
+        algorithm.impl.update(d3rlpy.torch_utility.TorchMiniBatch(**rows, **others, device="cpu:0"), k)
+    return found | _weights(algorithm.impl, "end")
+
+
+def _weights(impl: Any, when: str) -> dict[str, Any]:
+    """Of each network, layer by layer, without the deviation of actions."""
+    networks = {"policy": impl.policy, "critics": impl.modules.q_funcs}
+    if hasattr(impl.modules, "value_func"):
+        networks["value"] = impl.modules.value_func
+    found = {}
+    for network, module in networks.items():
+        layers = [array for name, array in module.state_dict().items() if "logstd" not in name]
+        found |= {f"{when} {network} {k:02d}": array.detach().numpy().copy() for k, array in enumerate(layers)}
+    return found
+
+
 def _algorithm(job: dict[str, Any]) -> Any:
     """With d3rlpy's numbers, which are also ours, but for what is given here."""
     encoder = d3rlpy.models.VectorEncoderFactory(hidden_units=[job["hidden"]] * 2, activation="swish")
@@ -49,7 +83,8 @@ def _algorithm(job: dict[str, Any]) -> Any:
     if job["trainer"] == "iql":
         config = d3rlpy.algos.IQLConfig(**parts, **sizes, value_encoder_factory=encoder)
     else:
-        config = d3rlpy.algos.TD3PlusBCConfig(**parts, **sizes)
+        noise = {"target_smoothing_sigma": 0.0} if "batches" in job else {}
+        config = d3rlpy.algos.TD3PlusBCConfig(**parts, **sizes, **noise)
     return config.create(device="cpu:0")
 
 

@@ -30,6 +30,7 @@ NOT_RUN_HERE = {
     "make reproduce-follow": "hours of training; docs/results/follow.md is what it writes",
     "make reproduce-offline": "half an hour of flights and training; docs/results/offline.md is what it writes",
     "python -m bench.offline.estimates": "minutes; docs/results/offline-estimates.md is what it writes",
+    ".venv/bin/python -m bench.offline_d3rlpy.alike --d3rlpy-python d3rlpy-env/bin/python": "d3rlpy",
     ".venv/bin/python -m bench.offline_d3rlpy --d3rlpy-python d3rlpy-env/bin/python": "hours, and d3rlpy",
     "python3 -m venv d3rlpy-env && d3rlpy-env/bin/pip install torch==2.13.0 d3rlpy": "its environment",
     "make train-demo": "minutes of training; tests/unit/mission/train runs its commands",

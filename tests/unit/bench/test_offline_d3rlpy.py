@@ -1,11 +1,13 @@
 """The comparison with d3rlpy: its table, and that neither library is given other rows than the other."""
 
+import json
+
 import h5py
 import numpy as np
 import pytest
 from rich.console import Console
 
-from bench.offline_d3rlpy import cases, page
+from bench.offline_d3rlpy import alike, cases, page
 from policies.datasets.exporting import export_d4rl
 from policies.datasets.reader import DatasetReader
 from policies.offline.store import open_store
@@ -21,6 +23,9 @@ def test_the_section_takes_the_place_of_the_one_that_is_there(tmp_path, monkeypa
     target = tmp_path / "offline.md"
     target.write_text("# Title\n\n## First\n\ntext\n")
     monkeypatch.setattr(page, "PAGE", target)
+    monkeypatch.setattr(page, "ALIKE", tmp_path / "alike.json")
+    apart = {"steps": 200, "td3_bc policy": 2e-7, "iql critics": 1.1e-6, "iql policy": 0.0084}
+    page.ALIKE.write_text(json.dumps(apart))
     page.write_section([ROW])
     worse = {"trainer": "td3_bc", "scores": [70.0, 72.0, 74.0], "d3rlpy_scores": [80.0, 80.0, 83.0]}
     within = {"trainer": "td3_bc", "quality": "replay", "scores": [70.0, 90.0], "d3rlpy_scores": [75.0, 90.0]}
@@ -34,6 +39,8 @@ def test_the_section_takes_the_place_of_the_one_that_is_there(tmp_path, monkeypa
     assert (
         "in 1 of 3 rows: 1 of 1 with IQL and 0 of 2 with TD3+BC. Of the other 2, 1 are within noise, 1 below" in words
     )
+    assert "by at most 1e-06 of the way that they have gone" in words
+    assert "IQL's policy by 0.008:" in words
     assert max(map(len, text.splitlines())) < 125
 
 
@@ -43,6 +50,20 @@ def test_the_interval_of_a_difference_is_students():
     assert low == pytest.approx(1.0 - 4.303 * 2.0**0.5)  # both have a variance of 2, of 2 seeds each
     assert high == pytest.approx(1.0 + 4.303 * 2.0**0.5)
     assert page.difference({"scores": [1.0], "d3rlpy_scores": [0.0]}) == (1.0, float("-inf"), float("inf"))
+
+
+@pytest.mark.parametrize(("trainer", "networks"), [("td3_bc", ("critics",)), ("iql", ("critics", "value"))])
+def test_steps_begin_with_the_others_weights(monkeypatch, trainer, networks):
+    rng, sizes = np.random.default_rng(1), {"policy": (alike.SEEN, alike.DONE), "value": (alike.SEEN, 1)}
+    theirs = {}
+    for network in ("policy", *networks):
+        seen, made = sizes.get(network, (alike.SEEN + alike.DONE, 1))
+        shapes = [(64, seen), (64,), (64, 64), (64,), (made, 64), (made,)] * (2 if network == "critics" else 1)
+        for k, shape in enumerate(shapes):
+            theirs[f"start {network} {k:02d}"] = rng.standard_normal(shape).astype(np.float32)
+            theirs[f"end {network} {k:02d}"] = theirs[f"start {network} {k:02d}"] + np.float32(0.5)
+    monkeypatch.setattr(alike, "STEPS", 0)
+    assert alike._apart(trainer, theirs) == {"policy": 1.0} | dict.fromkeys(networks, 1.0)  # not a step of that way
 
 
 def test_a_dataset_is_paid_by_the_numbers_of_its_case(tmp_path):
