@@ -57,11 +57,12 @@ def main(
     sizes = {"steps": steps, "hidden": hidden, "episodes": episodes}
     for seed, name, trainer, quality in product(range(seeds), case or CASES, TRAINERS, QUALITIES):
         key = {"case": name, "quality": quality, "trainer": trainer}
-        row = next((row for row in _rows() if row.items() >= (key | sizes).items()), key | sizes)
-        if len(row.get("scores", ())) > seed:
+        there = [row for row in _rows() if row.items() >= (key | sizes).items()]
+        row: dict[str, Any] = there[0] if there else key | sizes | {each: [] for each in OF_SEEDS}
+        if len(row["scores"]) > seed:
             continue
         found = _measured(CASES[name], trainer, quality, folder / name, sizes | {"seed": seed}, d3rlpy_python, console)
-        row = row | found | {each: [*row.get(each, ()), found[each]] for each in OF_SEEDS}
+        row |= found | {each: [*row[each], found[each]] for each in OF_SEEDS}
         write_whole(RESULTS, "".join(f"{json.dumps(each)}\n" for each in _with(row, list(key))).encode())
         console.print(row)
     write_section(_rows())
@@ -88,10 +89,10 @@ def _measured(
     store = open_store([str(dataset)])
     ours, our_s = _ours(trainer, store, sizes)
     theirs, their_s, notes = _theirs(trainer, store, dataset, sizes, python)
-    settings = settings_of(case.task, case.env_args)
+    settings, numbers = settings_of(case.task, case.env_args), dict(case.numbers)
     returns = [
         evaluate(
-            policy, case.task, settings, episodes=sizes["episodes"], seed=EVALUATION_SEED, params=case.numbers
+            policy, case.task, settings, episodes=sizes["episodes"], seed=EVALUATION_SEED, params=numbers
         ).mean_return
         for policy in (ours, theirs)
     ]

@@ -43,7 +43,7 @@ def main(
     record: dict[str, float] = {"steps": STEPS}
     with tempfile.TemporaryDirectory() as folder:
         batches = Path(folder) / "batches.npz"
-        np.savez(batches, **_batches())  # type: ignore[arg-type]  (numpy takes every keyword for a flag's)
+        np.savez(batches, allow_pickle=False, **_batches())
         for trainer in ("td3_bc", "iql"):
             job, out = Path(folder) / "job.json", Path(folder) / f"{trainer}.npz"
             words = {"trainer": trainer, "batches": str(batches), "out": str(out), "hidden": HIDDEN, "seed": 0}

@@ -11,7 +11,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from mission.dataset.collect import CollectOptions, collect_dataset
+from mission.dataset.collect import collect_dataset
+from mission.dataset.write_episodes import CollectOptions
 from policies.datasets.editing import merge
 
 QUALITIES: dict[str, tuple[float, ...]] = {"expert": (0.1,), "medium": (0.6,), "replay": (1.2, 0.9, 0.6, 0.3, 0.1)}

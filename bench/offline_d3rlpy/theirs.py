@@ -68,7 +68,7 @@ def _weights(impl: Any, when: str) -> dict[str, Any]:
     networks = {"policy": impl.policy, "critics": impl.modules.q_funcs}
     if hasattr(impl.modules, "value_func"):
         networks["value"] = impl.modules.value_func
-    found = {}
+    found: dict[str, Any] = {}
     for network, module in networks.items():
         layers = [array for name, array in module.state_dict().items() if "logstd" not in name]
         found |= {f"{when} {network} {k:02d}": array.detach().numpy().copy() for k, array in enumerate(layers)}

@@ -54,7 +54,7 @@ def evaluate(
     *,
     episodes: int,
     seed: int,
-    params: Mapping[str, Sampler] | None = None,
+    params: Mapping[str, float | Sampler] | None = None,
     is_greedy: bool = True,
     longest: int = LONGEST,
     source: str = "policy",
