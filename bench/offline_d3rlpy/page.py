@@ -51,15 +51,21 @@ def _verdict(rows: list[dict[str, Any]]) -> str:
         if (of := [row for row in rows if row["trainer"] == name])
     )
     less = [row for row in rows if difference(row)[0] < 0.0]
-    told = [row for row in less if len(row["scores"]) > 1]
-    beyond = sum(difference(row)[2] < 0.0 for row in told)
-    better = sum(difference(row)[1] > 0.0 for row in rows)
-    return (
-        f"Our mean score is at least d3rlpy's in {len(rows) - len(less)} of {len(rows)} rows: {of_each}. Of the other "
-        f"{len(less)}, {len(told) - beyond} are within noise, {beyond} below it, and {len(less) - len(told)} of one "
-        f"seed alone, which has no interval; {better} of all rows are above it. Noise is the 95 % interval of the "
-        "difference (Student's, over the seeds of both), which few seeds leave wide."
-    )
+    told = [row for row in rows if len(row["scores"]) > 1]
+    counts = {
+        "of the others are within noise": sum(difference(row)[2] >= 0.0 for row in less if row in told),
+        "of the others are below it": sum(difference(row)[2] < 0.0 for row in less),
+        "of all are above it": sum(difference(row)[1] > 0.0 for row in rows),
+    }
+    words = f"Our mean score is at least d3rlpy's in {len(rows) - len(less)} of {len(rows)} rows: {of_each}."
+    if told:
+        found = ", ".join(f"{count} {what}" for what, count in counts.items())
+        words += (
+            f" By the 95 % interval of the difference (Student's, over the seeds of both; few leave it wide) {found}."
+        )
+    if len(told) < len(rows):
+        words += f" {len(rows) - len(told)} rows are of one seed, which does not tell a difference from noise."
+    return words
 
 
 def _alike(apart: dict[str, float]) -> str:
