@@ -1,0 +1,48 @@
+"""What lenses that are not as they are taken to be make of a sight."""
+
+import numpy as np
+import pytest
+
+from policies.tasks.catalogue import build_task, task_settings
+
+ENVS = 16
+
+
+def sights(**numbers):
+    """First sights of the owner's chest [m] from the vehicle, level, forwards and right: (envs, 3)."""
+    settings = {"observation": "tracked", "has_estimator": "false", "terrain": "kept"}
+    task = build_task("FollowMe", ENVS, task_settings("FollowMe", settings))
+    task.set_params(
+        {
+            "lens_tilt_deg": 0.0,
+            "lens_scale": 1.0,
+            "owner_size": 1.0,
+            "owner_hides_per_min": 0.0,
+            "bystanders": 0.0,
+            "depth_max_m": 50.0,
+            "depth_holes": 0.0,
+        }
+        | numbers
+    )
+    task.reset(3)
+    away = task.follow.tracked.sights_ned.numpy()[:, 0] - task.follow.tracked.eyes_ned.numpy()[:, 0]
+    truth = task.rig.rows["truth"]
+    x, y, z, w = truth["q_ned_from_frd"].T
+    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    forwards = away[:, 0] * np.cos(yaw) + away[:, 1] * np.sin(yaw)
+    right = -away[:, 0] * np.sin(yaw) + away[:, 1] * np.cos(yaw)
+    return np.stack([forwards, right, away[:, 2]], axis=1)
+
+
+def test_a_camera_that_looks_up_by_five_degrees_shows_people_lower():
+    usual, tilted = sights(), sights(lens_tilt_deg=5.0)
+    level_m = np.hypot(usual[:, 0], usual[:, 1])
+    lower = (tilted - usual)[:, 2]
+    assert lower == pytest.approx(level_m * np.tan(np.radians(5.0)), rel=0.15)  # sights' own errors along the ray
+
+
+def test_a_wider_lens_shows_people_nearer_to_the_middle():
+    usual, wider = sights(), sights(lens_scale=1.1)
+    aside = np.abs(usual[:, 1]) > 0.3
+    assert aside.sum() > 4
+    assert np.all(np.abs(wider[aside, 1]) < np.abs(usual[aside, 1]))
