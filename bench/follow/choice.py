@@ -1,8 +1,9 @@
 """`python -m bench.follow.choice POLICY…`: which of some policies without images is best, by worlds of validation.
 
 In: policy files of FollowMe with `observation=tracked`, such as the checkpoints of several seeds. Out: how long each
-stays in the band in what it was trained in, under the guard's rule of the owner, with 95 % intervals, best first by
-where the interval begins. The episodes, of split `validation`, are neither trained on nor flown in a test.
+stays in the band in what such policies are trained in, under the guard's rule of the owner, with 95 % intervals, best
+first by where the interval begins. The episodes, of split `validation`, are not flown in a test, nor trained on since
+there is that split.
 """
 
 from pathlib import Path

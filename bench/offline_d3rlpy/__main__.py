@@ -26,6 +26,8 @@ from bench.row import require
 from common.files import write_whole
 from policies.datasets.exporting import export_d4rl
 from policies.learn.evaluate import evaluate
+from policies.learn.export.policy_file import load_policy
+from policies.learn.export.policy_path import find_policy
 from policies.learn.networks.normalizer import LIMIT
 from policies.learn.networks.policy import Policy
 from policies.offline.draws import Draws
@@ -85,28 +87,38 @@ def _measured(
     """Scores and times of both, of one seed."""
     folder.mkdir(parents=True, exist_ok=True)
     dataset = collected(case, quality, folder, console)
-    references = [_mean_return(collected(case, each, folder, console)) for each in ("random", "best")]
     store = open_store([str(dataset)])
     ours, our_s = _ours(trainer, store, sizes)
     theirs, their_s, notes = _theirs(trainer, store, dataset, sizes, python)
-    settings, numbers = settings_of(case.task, case.env_args), dict(case.numbers)
-    returns = [
-        evaluate(
-            policy, case.task, settings, episodes=sizes["episodes"], seed=EVALUATION_SEED, params=numbers
-        ).mean_return
-        for policy in (ours, theirs)
-    ]
-    scores = [normalized_score(value, references) for value in (*returns, _mean_return(dataset))]
+    episodes = sizes["episodes"]
+    references = [_mean_return(collected(case, "random", folder, console)), _best(case, episodes, folder, console)]
+    scores = [normalized_score(_judged(policy, case, episodes), references) for policy in (ours, theirs)]
+    is_alike = case.pilot == "expert"  # a policy's dataset has rewards by the numbers of its training
     return {
         "decisions": len(store),
         **notes,
         "scores": round(scores[0], 2),
         "d3rlpy_scores": round(scores[1], 2),
-        "dataset_score": round(scores[2], 2),
+        "dataset_score": round(normalized_score(_mean_return(dataset), references), 2) if is_alike else None,
         "cpu_s": round(our_s, 2),
         "d3rlpy_cpu_s": round(their_s, 2),
         "references": [round(value, 3) for value in references],
     }
+
+
+def _judged(policy: Policy, case: Case, episodes: int) -> float:
+    """Its mean return by the task's own numbers and the case's, in episodes of one seed."""
+    settings = settings_of(case.task, case.env_args)
+    numbers = dict(case.numbers)
+    return evaluate(policy, case.task, settings, episodes=episodes, seed=EVALUATION_SEED, params=numbers).mean_return
+
+
+def _best(case: Case, episodes: int, folder: Path, console: Console) -> float:
+    """What the pilot returns without noise, judged as the policies are."""
+    if case.pilot == "expert":
+        return _mean_return(collected(case, "best", folder, console))
+    policy, _ = load_policy(find_policy(case.pilot))
+    return _judged(policy, case, episodes)
 
 
 def _mean_return(dataset: Path) -> float:

@@ -39,6 +39,11 @@ def _apart(row: dict[str, Any]) -> str:
     return f"{apart:+.1f}" + (f" ({low:.1f} to {high:.1f})" if len(row["scores"]) > 1 else "")
 
 
+def _of_dataset(row: dict[str, Any]) -> str:
+    """None: its rewards weigh otherwise than the score."""
+    return "-" if row["dataset_score"] is None else f"{row['dataset_score']:.1f}"
+
+
 def _ratio(row: dict[str, Any]) -> float:
     return sum(row["d3rlpy_cpu_s"]) / sum(row["cpu_s"])
 
@@ -91,7 +96,9 @@ def write_section(rows: list[dict[str, Any]]) -> None:
         f"d3rlpy {version} and we learn from the same datasets (`bench/offline_d3rlpy/cases.py`; d3rlpy from their "
         f"D4RL export): {steps:,} gradient steps of 256 decisions, 2 layers of {hidden}, swish, discount 0.99, Adam at "
         "3e-4, one thread. A row is as many trainings by both as it has seeds; scores are their means and deviations, "
-        "0 at random actions and 100 at the pilot without noise. Times are of the processor, for the gradient steps "
+        "0 at random actions and 100 at the pilot without noise, which is judged as they are. Where the pilot is a "
+        "policy that ships, the rewards to learn from weigh as in its training, and the score as the task has it by "
+        "itself. Times are of the processor, for the gradient steps "
         f"alone; d3rlpy takes longer than we do, {spans}. {_verdict(rows)}"
     )
     lines = [
@@ -109,7 +116,7 @@ def write_section(rows: list[dict[str, Any]]) -> None:
         "|---|---|---|---|---|---|---|---|",
     ]
     lines += [
-        f"| {row['case']}, {row['quality']} | {_NAMES[row['trainer']]} | {row['dataset_score']:.1f} "
+        f"| {row['case']}, {row['quality']} | {_NAMES[row['trainer']]} | {_of_dataset(row)} "
         f"| {len(row['scores'])} | {_mean(row['scores'])} | {_mean(row['d3rlpy_scores'])} | {_apart(row)} "
         f"| {_ratio(row):.1f} |"
         for row in sorted(rows, key=lambda row: list(_NAMES).index(row["trainer"]))

@@ -57,7 +57,7 @@ def write_episodes(options: CollectOptions, note: Callable[[int], None] = lambda
     if task.layout.image is not None:
         raise DatasetError(f"{task.layout.task}: shows images as it is set, and datasets of episodes hold none")
     task.set_params(options.numbers)
-    notes = {f"{NUMBER_NOTE}{name}": f"{value:g}" for name, value in options.numbers.items()}
+    notes = {f"{NUMBER_NOTE}{name}": drawn for name, drawn in task.param_table.changed().items()}
     settings = getattr(task, "settings", None) or settings_of(options.task, options.env_args)
     pilot = (Path(name).stem if is_named else options.policy) + (f"-noise-{options.noise:g}" if options.noise else "")
     origin = DatasetOrigin(task.layout, settings.model_dump(mode="json"), pilot, options.seed, notes=notes)

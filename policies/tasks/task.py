@@ -96,6 +96,7 @@ class Task:
         self._arrays: dict[str, Any] = {}
         self.param_table = TaskParamTable(self.params, device)
         self.param_table.update(number_defaults)
+        self.param_table.keep_as_own()
         size = layout.observation_size
         buffers = StepBuffers()
         buffers.continuous = self._zeros("continuous", (env_count, len(layout.continuous)), float)

@@ -68,6 +68,7 @@ class TaskParamTable:
         start_warp()
         self._device = wp.zeros(self.rows.shape, dtype=float, device=device)
         self.update({name: number.default for name, number in self.declarations.items()})
+        self.keep_as_own()
 
     @property
     def array(self) -> Any:
@@ -92,6 +93,18 @@ class TaskParamTable:
             self._write(self.names.index(name), number, sampler)
         self._device.assign(self.rows)
 
+    def keep_as_own(self) -> None:
+        """From now on `changed` is what is drawn otherwise than now."""
+        self._own = self.rows.copy()
+
+    def changed(self) -> dict[str, str]:
+        """The numbers that are drawn otherwise than the task draws them by itself, and from what, as text."""
+        return {
+            name: _told(row)
+            for name, row, own in zip(self.names, self.rows, self._own, strict=True)
+            if (row != own).any()
+        }
+
     def _write(self, k: int, number: TaskParam, sampler: Sampler) -> None:
         ends = [end for interval in sampler.intervals for end in interval] or [sampler.mean]
         wrong = [end for end in ends if not number.minimum <= end <= number.maximum]
@@ -111,6 +124,14 @@ class TaskParamTable:
         else:
             row[0] = _GAUSSIAN
             row[_FIRST], row[_FIRST + 1] = sampler.mean, sampler.st_dev
+
+
+def _told(row: np.ndarray[Any, Any]) -> str:
+    """What a row draws from: 3, 1 to 2, or 3 ± 0.5."""
+    if row[0] == _GAUSSIAN:
+        return f"{row[_FIRST]:g} ± {row[_FIRST + 1]:g}"
+    pairs = row[_FIRST : _FIRST + 2 * int(row[0])].reshape(-1, 2)
+    return ", ".join(f"{low:g}" if low == high else f"{low:g} to {high:g}" for low, high in pairs)
 
 
 @wp.func

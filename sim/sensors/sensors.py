@@ -86,10 +86,12 @@ def sensor_model(noise_scale: float = 1.0, home: GeoPoint = DEFAULT_HOME, roughn
         roughness: of vibration and magnetic noise, see `roughened`.
 
     Raises:
-        ValueError: a negative noise scale.
+        ValueError: a negative noise scale, or a roughness that is not between 0 and 1.
     """
     if not noise_scale >= 0.0:
         raise ValueError(f"noise scale must be at least 0, not {noise_scale}")
+    if not 0.0 <= roughness <= 1.0:
+        raise ValueError(f"roughness must be between 0 and 1, not {roughness}")
     model = SensorModel()
     model.home_alt_amsl_m = home.alt_m
     model.imu = imu_model(noise_scale)
@@ -107,7 +109,8 @@ def sensor_model(noise_scale: float = 1.0, home: GeoPoint = DEFAULT_HOME, roughn
 def roughened(model: SensorModel, roughness: float) -> SensorModel:
     """Sensors as logs of real flights show them: 1 is the roughest of five, 0 those of a well isolated controller.
 
-    Roughness 1 is 3.1 m/s² and 0.065 rad/s RMS of vibration at a hover, and 22 mG of white noise of the field.
+    Roughness 1 is 3.1 m/s² and 0.065 rad/s RMS of vibration where an x500 hovers, less where motors turn slower, and 22
+    mG of white noise of the field; nothing where there is no noise.
     """
     shaken = 1.0 + roughness * (_SHAKEN - 1.0)
     model.imu.accel_tone = shaken * model.imu.accel_tone

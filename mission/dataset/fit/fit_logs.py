@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 
 from common.airframe import AirframeError
@@ -54,7 +55,7 @@ def fit_logs(options: FitOptions, console: Console) -> None:
     for log in damaged(logs):
         print_line(console, f"{log}: {DAMAGED}")
     segments, motor_hz = _segments(logs, start, console)
-    is_held = np.arange(len(segments)) % _HELD_OUT == _HELD_OUT - 1
+    is_held = np.concatenate([_held_out(int(count)) for count in np.bincount(segments.log)])
     learnt, held = segments.only(~is_held), segments.only(is_held)
     asked = [number for number in NUMBERS if not number.by_rates or motor_hz >= _RATES_LEAST_HZ]
     if len(asked) < len(NUMBERS):
@@ -73,6 +74,11 @@ def fit_logs(options: FitOptions, console: Console) -> None:
     if options.image is not None:
         draw(held, before, after, options.image)
         print_line(console, f"predicted and logged: {options.image}")
+
+
+def _held_out(count: int) -> NDArray[np.bool_]:
+    """Which segments of a flight are not learnt from: each fifth, so that all are learnt of one of four."""
+    return np.arange(count) % _HELD_OUT == _HELD_OUT - 1
 
 
 def _start(options: FitOptions) -> Fittable:
@@ -97,7 +103,7 @@ def _segments(logs: Sequence[Path], airframe: Fittable, console: Console) -> tup
         for note in found.notes:
             print_line(console, note)
         if len(found.segments):
-            parts.append(replace(found.segments, log=np.full(len(found.segments), len(parts), np.int32)))
+            parts.append(found.segments)
             motor_hz = min(motor_hz, found.motor_hz)
     count = sum(len(part) for part in parts)
     if count < _LEAST_SEGMENTS:

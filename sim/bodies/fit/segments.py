@@ -31,13 +31,15 @@ class Segments:
     vel_ned: NDArray[Any]  # (segments, ROWS, 3) [m/s]
     q_ned_from_frd: NDArray[Any]  # (segments, ROWS, 4) x, y, z, w
     omega_frd: NDArray[Any]  # (segments, ROWS, 3) [rad/s]
+    log_count: int = 1  # flights, those without a segment too
 
     def __len__(self) -> int:
         return len(self.log)
 
     def only(self, chosen: NDArray[np.bool_]) -> "Segments":
         """Some of the segments; the numbers of flights stay."""
-        return Segments(**{each.name: getattr(self, each.name)[chosen] for each in fields(self)})
+        arrays = {name: getattr(self, name)[chosen] for name in _ARRAYS}
+        return Segments(**arrays, log_count=self.log_count)
 
     @property
     def flown(self) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -51,11 +53,12 @@ class Segments:
         begins = LEAD_TICKS + WINDOW_TICKS * np.arange(WINDOWS)
         return self.vel_ned[:, LEAD_TICKS], self.omega_frd[:, begins]
 
-    @property
-    def log_count(self) -> int:
-        return int(self.log.max()) + 1
+
+_ARRAYS = tuple(each.name for each in fields(Segments) if each.name != "log_count")
 
 
 def joined(parts: Sequence[Segments]) -> Segments:
-    """The segments of several."""
-    return Segments(**{each.name: np.concatenate([getattr(p, each.name) for p in parts]) for each in fields(Segments)})
+    """The segments of several flights, one after the other."""
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS}
+    arrays["log"] = np.repeat(np.arange(len(parts), dtype=np.int32), [len(part) for part in parts])
+    return Segments(**arrays, log_count=len(parts))

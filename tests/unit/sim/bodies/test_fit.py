@@ -95,6 +95,14 @@ def test_flights_have_winds_of_their_own():
     assert fit_flights(X500, both).flights[:, :2] == pytest.approx(np.array([[0.0, 0.0], WIND_NE[0]]), abs=0.3)
 
 
+def test_some_segments_of_several_flights_are_still_of_as_many():
+    both = joined([flown(X500, commanded(20, 1.0)), flown(X500, commanded(1, 1.0))])
+    learnt = both.only(both.log == 0)
+    assert learnt.log_count == both.log_count == 2
+    for part in (both, learnt, both.only(both.log == 1)):
+        assert np.isfinite(errors_of(X500, part, fit_flights(X500, learnt).flights).rms()).all()
+
+
 def test_a_candidate_predicts_the_same_whoever_is_beside_it(changed):
     predictor = Predictor(commanded(3, 1.0))
     alone = predictor.predict([changed], WIND_NE[None])
