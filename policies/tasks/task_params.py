@@ -100,7 +100,7 @@ class TaskParamTable:
     def changed(self) -> dict[str, str]:
         """The numbers that are drawn otherwise than the task draws them by itself, and from what, as text."""
         return {
-            name: _told(row)
+            name: _text(row)
             for name, row, own in zip(self.names, self.rows, self._own, strict=True)
             if (row != own).any()
         }
@@ -126,7 +126,7 @@ class TaskParamTable:
             row[_FIRST], row[_FIRST + 1] = sampler.mean, sampler.st_dev
 
 
-def _told(row: np.ndarray[Any, Any]) -> str:
+def _text(row: np.ndarray[Any, Any]) -> str:
     """What a row draws from: 3, 1 to 2, or 3 ± 0.5."""
     if row[0] == _GAUSSIAN:
         return f"{row[_FIRST]:g} ± {row[_FIRST + 1]:g}"

@@ -97,7 +97,6 @@ class Drive(FlightTask):
         state = DriveState()
         state.flight = typed_rows(self.buffers.params, FlightParams)
         state.params = typed_rows(self.buffers.params, DriveParams, first=len(FLIGHT_PARAMS))
-        state.model = wp.clone(self.rig.models[:1])
         state.actions = self._zeros("last_actions", n, wp.vec2)
         state.goals = self._zeros("goals", n, wp.vec3)
         state.outs = self._zeros("outs", n, float)

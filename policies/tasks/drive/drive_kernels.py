@@ -20,7 +20,6 @@ from policies.tasks.flight.driven_vehicle import RoverArrays, vary_rover
 from policies.tasks.flight.episode_start import Start, ask_for_world, begin_flight
 from policies.tasks.flight.flight_params import FlightParams
 from policies.tasks.flight.flown_vehicle import free_setpoint, vehicle_estimate
-from sim.bodies.rover_model import RoverModel
 from sim.sensors.ground_ring import ring_ranges
 from sim.truth import Truth
 from sim.world.world import World, obstacle_contact, world_at
@@ -51,7 +50,6 @@ class DriveState:
 
     flight: wp.array(dtype=FlightParams)
     params: wp.array(dtype=DriveParams)
-    model: wp.array(dtype=RoverModel)  # (1,) before it is varied
     actions: wp.array(dtype=wp.vec2)  # the last
     goals: wp.array(dtype=wp.vec3)  # north, east, heading
     outs: wp.array(dtype=float)  # of goals: see `way_left_m`
@@ -175,7 +173,7 @@ def place(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: Driv
     episode = buffers.episodes[i] - 1
     params = state.params[i]
     friction, rolling = params.friction_scale, params.rolling_scale
-    vary_rover(rig, state.model, start.makes, state.flight[i], friction, rolling, seed, i, episode)
+    vary_rover(rig, start.makes, state.flight[i], friction, rolling, seed, i, episode)
     world = world_now(rig, i)
     goal = course_goal(world, params.goal_min_m, params.goal_max_m, seed, i, episode)
     out = float(0.0)

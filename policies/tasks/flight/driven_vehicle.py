@@ -9,7 +9,6 @@ from policies.tasks.flight.flight_params import FlightParams
 from policies.tasks.flight.flown_vehicle import Makes, sensors_of_episode, wind_of_episode
 from sim.advance import rig_arrays, rig_kernels
 from sim.bodies.rover import ROVER_BODY
-from sim.bodies.rover_model import RoverModel
 from sim.wind import WindState
 
 wp.set_module_options({"enable_backward": False})
@@ -21,7 +20,6 @@ _forget_impacts = rig_kernels(ROVER_BODY, ROVER_LAW).forget_impacts
 @wp.func
 def vary_rover(
     rig: RoverArrays,
-    models: wp.array(dtype=RoverModel),
     makes: Makes,
     flight: FlightParams,
     friction_scale: float,
@@ -34,7 +32,6 @@ def vary_rover(
 
     Args:
         rig: all rows.
-        models: (1,) of the rover before it is varied.
         makes: of its sensors.
         flight: numbers of the episode.
         friction_scale: factor on what the tyres hold.
@@ -43,7 +40,7 @@ def vary_rover(
         i: the row.
         episode: of the draws.
     """
-    model = models[0]
+    model = rig.model[i]  # as it stood in its bank
     model.mass_kg = model.mass_kg * flight.mass_scale
     model.mass_inv = model.mass_inv / flight.mass_scale
     model.inertia_frd = model.inertia_frd * flight.mass_scale

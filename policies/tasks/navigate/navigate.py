@@ -162,7 +162,7 @@ class Navigate(FlightTask):
         self._scan = record(scan, rig, state.params, state.is_all, *reported, 0, state.scans_m, state.ranges_m)
         self._judge = record(judge, buffers, rules, rig, state, start)
         self._prepare = record(prepare, buffers, state, start)
-        self._place = record(place, buffers, rig, wp.clone(self.rig.models[:1]), state, start)
+        self._place = record(place, buffers, rig, state, start)
         self._show = record(show, buffers, rules, rig, state, start)
 
 

@@ -158,14 +158,14 @@ def prepare(buffers: StepBuffers, state: NavigateState, start: Start) -> None:
 
 
 @wp.kernel(enable_backward=False)
-def place(buffers: StepBuffers, rig: Any, models: Any, state: NavigateState, start: Start) -> None:
+def place(buffers: StepBuffers, rig: Any, state: NavigateState, start: Start) -> None:
     i = wp.tid()
     if not start.is_starting[i]:
         return
     seed = buffers.seed[i]
     episode = buffers.episodes[i] - 1
     params = state.params[i]
-    vary(rig, models, start.makes, state.flight[i], seed, i, episode)
+    vary(rig, start.makes, state.flight[i], seed, i, episode)
     state.attitude_errors[i] = attitude_error(params.attitude_error_deg, seed, i, episode)
     pos_ned = rig.truth[i].pos_ned
     bearing = draw_angle(seed, i, episode, _BEARING_STREAM)

@@ -12,8 +12,6 @@ from policies.tasks.flight.flight_params import FlightParams
 from policies.tasks.flight.flown_vehicle import Makes, own_state, vary_vehicle, vehicle_estimate
 from policies.tasks.flight.own_state import OwnState
 from sim.advance import RigArrays
-from sim.bodies.body import DEFAULT_BODY
-from sim.bodies.rover_model import RoverModel
 from sim.truth import has_touched
 
 wp.set_module_options({"enable_backward": False})
@@ -25,28 +23,26 @@ _RAD_PER_DEG = wp.constant(math.pi / 180.0)
 @wp.func
 def vary(
     rig: RigArrays,
-    models: wp.array(dtype=DEFAULT_BODY.Model),  # noqa: ARG001
     makes: Makes,
     flight: FlightParams,
     seed: int,
     i: int,
     episode: int,
 ) -> None:
-    """Gives row i the air, the sensors and the make of its episode; `models` is the vehicle before that, shape (1,)."""
+    """Gives row i the air, the sensors and the make of its episode."""
     vary_vehicle(rig, makes, flight, seed, i, episode)
 
 
 @wp.func  # type: ignore[no-redef]
 def vary(  # noqa: F811
     rig: RoverArrays,
-    models: wp.array(dtype=RoverModel),
     makes: Makes,
     flight: FlightParams,
     seed: int,
     i: int,
     episode: int,
 ) -> None:
-    vary_rover(rig, models, makes, flight, 1.0, 1.0, seed, i, episode)
+    vary_rover(rig, makes, flight, 1.0, 1.0, seed, i, episode)
 
 
 @wp.func
