@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from bench.cars.run import Curve, changed
+from bench.goal_episodes import first_episodes
 from bench.page_section import kept_from
 from bench.row import machine
 from common.files import write_whole
@@ -24,8 +24,6 @@ from policies.learn.config.recipes import recipe
 from policies.learn.export.policy_file import load_policy, save_policy
 from policies.learn.export.policy_path import CheckpointError, find_policy
 from policies.learn.networks.policy import Policy
-from policies.learn.rollout.task_tensors import TaskTensors
-from policies.learn.torch_threads import few_threads
 from policies.learn.trainer import train
 from policies.tasks.catalogue import build_task, settings_of, task_settings
 from policies.tasks.drive.drive import Drive
@@ -95,20 +93,9 @@ def judged(policy: Policy, preset: str, count: int = EPISODES) -> Drives:
     task = build_task("Drive", count, task_settings("Drive", settings))
     if not isinstance(task, Drive):
         raise TypeError(task)
-    task.layout.require(policy.layout, "the policy")
     task.reset(SEED)
-    outcomes, times_s = np.zeros(count, dtype=np.int32), np.zeros(count, dtype=np.float32)
-    tensors, memory = TaskTensors(task), policy.start_memory(count)
-    with few_threads(), torch.inference_mode():
-        for _ in range(LONGEST):
-            actions, memory = policy.act(tensors.observation, memory, None)
-            tensors.step(policy.bounded(actions), actions.branches)
-            ended = (outcomes == Outcome.RUNNING) & (task.buffers.outcomes.numpy() != Outcome.RUNNING)
-            outcomes[ended] = task.buffers.outcomes.numpy()[ended]
-            times_s[ended] = task.measures.numpy()[ended, MEASURES.index("time_s")]
-            if (outcomes != Outcome.RUNNING).all():
-                break
-    return Drives(outcomes, times_s)
+    outcomes, measures = first_episodes(policy, task, LONGEST)
+    return Drives(outcomes, measures[:, MEASURES.index("time_s")])
 
 
 def row(preset: str, drives: Drives, took_s: float | None) -> str:

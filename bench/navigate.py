@@ -11,9 +11,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
+from bench.goal_episodes import first_episodes
 from bench.page_section import kept_from
 from bench.row import machine
 from common.files import write_whole
@@ -21,8 +21,6 @@ from common.intervals import Interval, bootstrap, rate
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy
 from policies.learn.networks.policy import Policy
-from policies.learn.rollout.task_tensors import TaskTensors
-from policies.learn.torch_threads import few_threads
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.episode import Outcome
 from policies.tasks.navigate.navigate import Navigate
@@ -109,24 +107,15 @@ def fly(policy: Policy, task: Navigate) -> Flights:
     """Every environment plays its first episode."""
     count = task.env_count
     goals_ned = task.navigation.goals_ned.numpy().copy()
-    outcomes = np.zeros(count, dtype=np.int32)
-    measures = np.zeros((count, len(MEASURES)), dtype=np.float32)
     paths: list[list[NDArray[np.float64]]] = [[] for _ in range(min(PICTURES, count))]
-    tensors = TaskTensors(task)
-    memory = policy.start_memory(count)
-    with few_threads(), torch.inference_mode():
-        for _ in range(LONGEST):
-            pos_ned = task.rig.truth.numpy()["pos_ned"]
-            for i, path in enumerate(paths):
-                if outcomes[i] == Outcome.RUNNING:
-                    path.append(pos_ned[i, :2].astype(np.float64))
-            actions, memory = policy.act(tensors.observation, memory, None)
-            tensors.step(policy.bounded(actions), actions.branches)
-            ended = (outcomes == Outcome.RUNNING) & (task.buffers.outcomes.numpy() != Outcome.RUNNING)
-            outcomes[ended] = task.buffers.outcomes.numpy()[ended]
-            measures[ended] = task.measures.numpy()[ended]
-            if (outcomes != Outcome.RUNNING).all():
-                break
+
+    def note(outcomes: NDArray[np.int32]) -> None:
+        pos_ned = task.rig.truth.numpy()["pos_ned"]
+        for i, path in enumerate(paths):
+            if outcomes[i] == Outcome.RUNNING:
+                path.append(pos_ned[i, :2].astype(np.float64))
+
+    outcomes, measures = first_episodes(policy, task, LONGEST, note)
     return Flights(outcomes, measures, [np.array(path) for path in paths], goals_ned)
 
 
@@ -173,7 +162,6 @@ def main(arguments: list[str]) -> int:
     lines = []
     for trees_per_ha in DENSITIES:
         task = build(settings, trees_per_ha, EPISODES)
-        task.layout.require(policy.layout, "the policy")
         flights = fly(policy, task)
         lines.append(row(trees_per_ha, flights))
         print(lines[-1], flush=True)
