@@ -41,6 +41,7 @@ class DecisionRows:
     i_image: Rows
     is_flying: Rows
     is_first: Rows
+    is_struck: Rows  # before the next decision, by what its accelerometers felt
     context: Mapping[str, str | float] = field(default_factory=dict)
 
     def part(self, chosen: slice) -> "DecisionRows":
@@ -54,6 +55,7 @@ class DecisionRows:
 
 COLUMNS = (
     "time_us", "frame", "action", "flown", "pos_ned", "vel_ned", "goal", "yaw", "i_image", "is_flying", "is_first",
+    "is_struck",
 )  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from sim.truth import Truth
 wp.set_module_options({"enable_backward": False})
 
 _SAME = wp.constant(1.0e-3)  # [m/s], [rad/s] of what is flown: float32 in a log
+_STRUCK_M_S = wp.constant(1.0)  # any: it is not paid by
 _ENDLESS_M = wp.constant(1.0e9)  # of the way at the start: a flight's time is never up
 
 
@@ -63,6 +64,7 @@ def drive_rows(
     distances_m: wp.array(dtype=float),
     turns_rad: wp.array(dtype=float),
     rooms_m: wp.array(dtype=float),
+    has_touched: wp.array(dtype=int),
     actions: wp.array(dtype=wp.vec2),
     rewards: wp.array(dtype=float),
     outcomes: wp.array(dtype=int),
@@ -74,6 +76,8 @@ def drive_rows(
         last = actions[i - 1]
     left_m = distances_m[i + 1]
     truth = truths[i + 1]
+    if has_touched[i + 1] == 1:
+        truth.impact_speed = _STRUCK_M_S
     outcome = drive_outcome(params[0], truth, left_m, turns_rad[i + 1], left_m, _ENDLESS_M, 0.0)
     outcomes[i] = outcome
     rewards[i] = drive_reward(

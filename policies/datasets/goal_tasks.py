@@ -1,7 +1,8 @@
 """Logged flights to goals as episodes of Navigate, and drives into poses as episodes of Drive.
 
 In: decisions, and the truth where the log has it. Out: rewards and ends by the tasks' own functions; where the vehicle
-is by the truth or else by its estimate, the room round it by its ranges, which are in the observation.
+is by the truth or else by its estimate, the room round it by its ranges, which are in the observation, and what it
+struck by its accelerometers.
 """
 
 import numpy as np
@@ -35,6 +36,13 @@ class _GoalJudge:
         self.layout: Layout = task.layout
         self._step_s = task.decision_s
         self._params = wp.array(task.param_table.typical(), dtype=float)
+
+    def _touched(self, run: DecisionRows) -> Rows:
+        """Whether something was struck on the way to each row, which after the last is the last's, shape (n,)."""
+        touched = np.zeros(len(run), np.int32)
+        touched[1:] = run.is_struck[:-1]
+        touched[-1] |= int(run.is_struck[-1])
+        return touched
 
     def _where(self, run: DecisionRows, truth: TruthRows | None, height_m: Rows) -> Rows:
         """Rows of `Truth`: the truth, or the estimate in its place.
@@ -72,7 +80,9 @@ class NavigateJudge(_GoalJudge):
         ranges_m = (1.0 - run.frame[:, -RANGES:]) * RANGE_M
         rooms = np.minimum(ranges_m.min(axis=1), _ROOM_MAX_M)
         drives = self.layout.task == "NavigateRover"
-        touched = np.zeros(len(run), np.int32) if drives else where["is_on_ground"]
+        touched = self._touched(run)
+        if not drives:
+            touched |= where["is_on_ground"]
         steps = len(run) - 1
         rewards, outcomes = wp.zeros(steps, dtype=float), wp.zeros(steps, dtype=int)
         inputs = [
@@ -80,7 +90,7 @@ class NavigateJudge(_GoalJudge):
             wp.array(where, dtype=Truth),
             wp.array(_floats(run.goal), dtype=wp.vec3),
             wp.array(_floats(rooms), dtype=float),
-            wp.array(np.ascontiguousarray(touched, np.int32), dtype=int),
+            wp.array(touched, dtype=int),
             wp.array(_floats(actions[:steps]), dtype=wp.vec4),
             self._step_s,
         ]
@@ -119,6 +129,7 @@ class DriveJudge(_GoalJudge):
             wp.array(_floats(np.hypot(off[:, 0], off[:, 1])), dtype=float),
             wp.array(_floats(turns), dtype=float),
             wp.array(_floats(rooms), dtype=float),
+            wp.array(self._touched(run), dtype=int),
             wp.array(_floats(actions[:steps]), dtype=wp.vec2),
         ]
         wp.launch(drive_rows, steps, [*inputs, rewards, outcomes])

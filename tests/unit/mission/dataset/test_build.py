@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from common.logs.ulog import UlogWriter
 from mission.cli import app
+from mission.dataset.sources import struck
 from mission.log.ulog_file import is_whole
 from policies.companion.decision_log import TOPIC, topic_fields, topic_info
 from policies.companion.vector_pilot import NavigationPilot
@@ -39,6 +40,17 @@ def logged(path, count=200):
         topic.write_row(100_000 * (k + 1), 0, *frame, *motion, 0.0, -1, True, k == 0, 0, 0)
     log.close()
     return path
+
+
+def test_what_the_accelerometers_felt_before_the_next_decision_is_a_blow():
+    sensed = {f"accelerometer_m_s2[{k}]": np.zeros(6) for k in range(3)}
+    sensed["timestamp"] = np.array([90, 130, 240, 299, 550, 700], np.uint64) * 1000
+    sensed["accelerometer_m_s2[0]"][:] = [50.0, 5.0, -6.0, 0.0, 20.0, 20.0]
+    sensed["accelerometer_m_s2[1]"][:] = [0.0, 4.0, -6.0, 0.0, 0.0, 0.0]
+    sensed["accelerometer_m_s2[2]"][:] = -60.0  # of a climb, or of a landing
+    decided_us = np.array([100, 200, 300, 400], np.uint64) * 1000
+    assert struck(sensed, decided_us).tolist() == [False, True, False, True]  # that at 700 ms came too late
+    assert not struck(None, decided_us).any()
 
 
 @pytest.mark.parametrize("task", ["Drive", "FollowMe", "Navigate"])

@@ -38,6 +38,7 @@ def decisions(layout, n=12, *, goal=(20.0, 0.0, -2.0), speed=2.0, **columns):
         "i_image": np.full(n, -1),
         "is_flying": np.ones(n, np.uint8),
         "is_first": np.zeros(n, np.uint8),
+        "is_struck": np.zeros(n, np.bool_),
     }
     return DecisionRows("run/flight.ulg", layout, "somebody", **(made | columns))
 
@@ -53,6 +54,19 @@ def test_a_gap_cuts_an_episode_and_is_reported():
     found = runs_of(rows, has_others=False)
     assert [(each.start, each.stop) for each in found.slices] == [(0, 6), (6, 12)]
     assert found.gaps == ((pytest.approx(0.6), pytest.approx(1.0)),)
+
+
+@pytest.mark.parametrize(("task", "judge"), [("Navigate", NavigateJudge), ("Drive", DriveJudge)])
+@pytest.mark.parametrize("at", [6, 11])  # the last: it was struck after it
+def test_a_blow_ends_an_episode_as_a_collision_and_is_paid_for(task, judge, at):
+    made, struck = judge(task_of(task)), np.zeros(12, np.bool_)
+    struck[at] = True
+    (unharmed,) = episodes_of(decisions(made.layout), made, None)
+    (episode,) = episodes_of(decisions(made.layout, is_struck=struck), made, None)
+    steps = min(at + 1, 11)
+    assert (episode.outcome, episode.is_terminated, len(episode)) == ("hit_obstacle", True, steps)
+    assert episode.rewards[:-1] == pytest.approx(unharmed.rewards[: steps - 1])
+    assert episode.rewards[-1] < unharmed.rewards[steps - 1] - 4.0  # the task's cost of a collision
 
 
 def test_what_another_flew_counts_only_if_it_is_asked_for(navigate):
