@@ -57,7 +57,7 @@ reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policy from nothing,
 	@$(BIN)/honeyguide train navigate-rover --run-id navigate-rover --force
 	@$(BIN)/python -m bench.navigate_rover results/navigate-rover/NavigateRover.pt
 
-reproduce-offline: $(STAMP) ## Log flights, learn from their logs alone, forecast, then fly; flags: ARGS="--clumsy 60 --shipped 30"
+reproduce-offline: $(STAMP) ## Log flights, learn from their logs alone, forecast, then fly: to follow, park and navigate; one: ARGS="--story park"
 	@$(BIN)/python -m bench.offline_story $(ARGS)
 
 reproduce-drive: $(STAMP) ## Train and judge the policies of docs/results/drive.md (half an hour); only judge: ARGS="judge"

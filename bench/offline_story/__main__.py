@@ -237,5 +237,8 @@ def _honeyguide(*words: str, accepted: Sequence[int] = (0,)) -> None:
         raise SystemExit(f"honeyguide {' '.join(words[:2])} failed")
 
 
+app = typer.Typer(add_completion=False)
+app.command()(main)
+
 if __name__ == "__main__":
-    typer.run(main)
+    app()

@@ -44,7 +44,7 @@ def _image(story: Story, what: str = "") -> Path:
 
 def write_page(story: Story, folder: Path, result: Result) -> None:
     """The section of the page that is measured, and the images."""
-    figures = {measure.key: _figures(story, measure, result) for measure in story.measures}
+    figures = figures_of(story, result)
     page = DOCS / f"{story.page}.md"
     section = "\n".join((HEADING, "", *section_lines(story, result, figures), ""))
     write_whole(page, with_section(page.read_text(encoding="utf-8"), HEADING, section).encode())
@@ -127,12 +127,15 @@ def _flown_table(story: Story, result: Result, figures: Mapping[str, Figures]) -
     return lines
 
 
-def _figures(story: Story, measure: Measure, result: Result) -> Figures:
-    """As flown."""
+def figures_of(story: Story, result: Result) -> dict[str, Figures]:
+    """By measure, as flown."""
     return {
-        (name, condition): figure([measure.of(outcome) for outcome in result.flown[name][condition]])
-        for name in story.pilot_titles
-        for condition in story.conditions
+        measure.key: {
+            (name, condition): figure([measure.of(outcome) for outcome in result.flown[name][condition]])
+            for name in story.pilot_titles
+            for condition in story.conditions
+        }
+        for measure in story.measures
     }
 
 

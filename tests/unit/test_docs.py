@@ -28,7 +28,11 @@ NOT_RUN_HERE = {
     "make reproduce-cars": "hours of training; docs/results/cars.md is what it writes",
     "make reproduce-navigate": "half an hour of training; docs/results/navigate.md is what it writes",
     "make reproduce-follow": "hours of training; docs/results/follow.md is what it writes",
-    "make reproduce-offline": "half an hour of flights and training; docs/results/offline.md is what it writes",
+    "make reproduce-offline": "hours of flights and training; docs/results/offline.md is what it writes",
+    **{
+        f'make reproduce-offline ARGS="--story {story}"': f"half an hour; docs/results/{page}.md is what it writes"
+        for story, page in (("follow", "offline"), ("park", "offline-parking"), ("navigate", "offline-navigate"))
+    },
     "python -m bench.offline.estimates": "minutes; docs/results/offline-estimates.md is what it writes",
     ".venv/bin/python -m bench.offline_d3rlpy.alike --d3rlpy-python d3rlpy-env/bin/python": "d3rlpy",
     ".venv/bin/python -m bench.offline_d3rlpy --d3rlpy-python d3rlpy-env/bin/python": "hours, and d3rlpy",
