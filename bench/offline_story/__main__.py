@@ -171,8 +171,8 @@ class Telling:
         """What each policy is said to return before it has flown, by estimates on the logs."""
         from bench.offline_story.forecast import forecast
 
-        datasets, policies = self._datasets(mix), self._policies(mix)
-        return _once(self.folder / f"{mix}forecast.json", lambda: forecast(datasets, policies, self.jobs))
+        given = self._datasets(mix), self._policies(mix), self.story.forecast_steps, self.jobs
+        return _once(self.folder / f"{mix}forecast.json", lambda: forecast(*given))
 
     def _validate(self, mix: str) -> dict[str, Any]:
         """How the policies do in batch, in worlds of training, alone: the one that flies is chosen by this."""

@@ -49,6 +49,8 @@ class Story:
     """Flights of each pilot, and judged flights of each condition."""
     steps: int
     """Gradient steps of each training."""
+    forecast_steps: int
+    """Of fitted Q evaluation."""
     env_args: tuple[str, ...]
     gamma: float
     seeds: Mapping[str, int]
@@ -95,7 +97,7 @@ def _judge_parking(policies: Mapping[str, Path], split: Split) -> Judged:
 def _judge_navigating(policies: Mapping[str, Path], split: Split) -> Judged:
     from bench.offline_story.goal_batch import judged_navigating
 
-    return judged_navigating(policies, split)
+    return judged_navigating(policies, split, STORIES["navigate"].conditions)
 
 
 FOLLOW_NUMBERS = {"collision_cost": 80.0, "lost_cost": 40.0, "jerk_cost": 0.2}
@@ -110,6 +112,7 @@ STORIES = {
         pilots={"clumsy": "bench.offline_story.pilots:Clumsy", "shipped": "follow-me-tracked"},
         sizes={"clumsy": 24, "shipped": 12, "flown": 12},
         steps=20_000,
+        forecast_steps=5000,
         env_args=("observation=tracked", "has_estimator=false", "owner=any", "terrain=kept", "stack=3"),
         numbers=FOLLOW_NUMBERS,
         gamma=0.97,
@@ -126,8 +129,9 @@ STORIES = {
         task="Drive",
         benchmark="park",
         pilots={"clumsy": "bench.offline_story.pilots:ClumsyDriver", "shipped": "drive-park"},
-        sizes={"clumsy": 120, "shipped": 60, "flown": 24},
+        sizes={"clumsy": 120, "shipped": 120, "flown": 12},
         steps=10_000,
+        forecast_steps=2000,
         env_args=("preset=park", "has_estimator=false"),
         gamma=0.99,
         seeds={"clumsy": 3_911_000, "shipped": 3_911_240, "flown": 3_910_001},
@@ -146,8 +150,9 @@ STORIES = {
         task="Navigate",
         benchmark="navigate",
         pilots={"clumsy": "bench.offline_story.pilots:ClumsyNavigator", "shipped": "navigate-late"},
-        sizes={"clumsy": 60, "shipped": 30, "flown": 24},
-        steps=10_000,
+        sizes={"clumsy": 60, "shipped": 30, "flown": 12},
+        steps=6_000,
+        forecast_steps=2000,
         env_args=("has_estimator=false",),
         gamma=0.97,
         seeds={"clumsy": 3_912_000, "shipped": 3_912_120, "flown": 3_913_001},
