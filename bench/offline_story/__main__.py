@@ -26,7 +26,7 @@ from policies.learn.export.policy_path import find_policy
 TRAINERS: dict[str, dict[str, Any]] = {
     "bc": {},
     "bc-best": {"best_fraction": 0.34},
-    "iql": {"expectile": 0.8, "inverse_temperature": 3.0},
+    "iql": {"expectile": 0.8},
     "td3_bc": {"alpha": 2.5},
 }
 MIXES = {"": ("clumsy", "shipped"), "medium-": ("clumsy",)}
@@ -128,11 +128,13 @@ class Telling:
 
     def _train(self, mix: str) -> None:
         for trainer, hyperparameters in TRAINERS.items():
-            name = f"{mix}{trainer}"
+            name, given = f"{mix}{trainer}", dict(hyperparameters)
             if self._policy(name).exists():
                 continue
             recipe = self.folder / f"{name}.yaml"
-            behavior = self._behavior(mix, trainer.split("-")[0], hyperparameters)
+            if trainer == "iql":
+                given["inverse_temperature"] = self.story.inverse_temperature
+            behavior = self._behavior(mix, trainer.split("-")[0], given)
             told = {"behaviors": {self.story.task: behavior}, **self._environment()}
             write_whole(recipe, json.dumps(told, indent=1).encode())
             words = ("--run-id", name, "--results-dir", str(self.folder / "runs"), "--seed", "1", "--force")

@@ -50,7 +50,8 @@ def write_page(story: Story, folder: Path, result: Result) -> None:
     write_whole(page, with_section(page.read_text(encoding="utf-8"), HEADING, section).encode())
     measures = {measure: figures[measure.key] for measure in story.measures}
     draw_bars(_image(story), measures, story.pilot_titles, story.conditions, story.titles[0])
-    draw_curves(_image(story, "-curves"), folder / "runs", story.task, LEARNT_FROM, list(result.validated[""]))
+    mixes = {mix: f"{story.titles[0]} {pilots}" for mix, pilots in LEARNT_FROM.items()}
+    draw_curves(_image(story, "-curves"), folder / "runs", story.task, mixes, list(result.validated[""]))
     write_whole(folder / "story.json", json.dumps(asdict(result)).encode())
 
 
@@ -66,10 +67,9 @@ def section_lines(story: Story, result: Result, figures: Mapping[str, Figures]) 
         lines += ["", f"From the {words[0]} {pilots}:", "", *_forecast_table(story, result, mix)]
     lines += ["", *_flown_table(story, result, figures), ""]
     for name in ("medium", "offline"):
-        for measure in story.measures:
-            gained = ", ".join(f"{each} {_gained(figures[measure.key], name, each)}" for each in story.conditions)
-            what = f" ({measure.title})" if len(story.measures) > 1 else ""
-            lines.append(f"- {titles[name]}, of the way from the mediocre pilot to the {words[1]}{what}: {gained}")
+        found = figures[story.measures[0].key]
+        gained = ", ".join(f"{each} {_gained(found, name, each)}" for each in story.conditions)
+        lines.append(f"- {titles[name]}, of the way from the mediocre pilot to the {words[1]}: {gained}")
     return [
         *lines,
         "",
@@ -155,7 +155,10 @@ def _value(value: float, measure: Measure) -> str:
 def _interval(found: Interval, measure: Measure) -> str:
     if not isfinite(found.value):
         return "-"
-    return f"{_value(found.value, measure)} ({_number(found.low, measure)} to {_number(found.high, measure)})"
+    value = _value(found.value, measure)
+    if not isfinite(found.low):  # of one flight
+        return value
+    return f"{value} ({_number(found.low, measure)} to {_number(found.high, measure)})"
 
 
 def _number(value: float, measure: Measure) -> str:

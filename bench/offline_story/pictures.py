@@ -75,7 +75,7 @@ def draw_curves(path: Path, runs: Path, task: str, mixes: Mapping[str, str], tra
             points = _points(runs / f"{mix}{trainer}" / task)
             steps, success = zip(*sorted(points.items()), strict=True)
             axes.plot(steps, [100 * value for value in success], ".-", color=colour, label=trainer)
-        axes.set_title(f"flights {words}", fontsize=10)
+        axes.set_title(words, fontsize=10)
         axes.set_xlabel("gradient steps")
         axes.grid(alpha=0.3)
     panels[0].set_ylabel("success in batch [%]")

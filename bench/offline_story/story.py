@@ -67,6 +67,8 @@ class Story:
     """Policies in batch, as near to the flights as a batch comes, in worlds of training or in held-out ones."""
     page: str
     """The page's name in docs/results, its images' too."""
+    inverse_temperature: float = 3.0
+    """Of IQL's weights, which are exponents of advantages: as small as rewards are great."""
     titles: tuple[str, str] = ("flights", "policy that ships")
     numbers: Mapping[str, float] | None = None
     """What rewards weigh; None: as the task does."""
@@ -129,7 +131,7 @@ STORIES = {
         task="Drive",
         benchmark="park",
         pilots={"clumsy": "bench.offline_story.pilots:ClumsyDriver", "shipped": "drive-park"},
-        sizes={"clumsy": 120, "shipped": 120, "flown": 12},
+        sizes={"clumsy": 120, "shipped": 120, "flown": 24},
         steps=10_000,
         forecast_steps=2000,
         env_args=("preset=park", "has_estimator=false"),
@@ -143,6 +145,7 @@ STORIES = {
         ),
         is_hit=lambda drive: bool(drive["outcome"] == "touched"),
         judge=_judge_parking,
+        inverse_temperature=0.3,  # twenty are paid for arriving
         page="offline-parking",
         titles=("drives", "policy that ships"),
     ),
