@@ -24,7 +24,7 @@ from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Outcome, StepBu
 from policies.tasks.goals import PositionGoal
 from policies.tasks.layout import Element, Layout
 from policies.tasks.reshaping import Array, Decision, Reshaping
-from policies.tasks.task_params import Sampler, TaskParam, TaskParamTable
+from policies.tasks.task_params import NumberError, Sampler, TaskParam, TaskParamTable
 
 Preset = Literal["as-documented", "as-coded", "improved"]
 Split = Literal["train", "test"]
@@ -239,7 +239,14 @@ class Task:
         return state
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Restores what `state` returned, of a task with the same settings and size."""
+        """Restores what `state` returned, of a task with the same settings and size.
+
+        Raises:
+            NumberError: it was saved by a version of the task that had other numbers.
+        """
+        if state["samplers"].shape != self.param_table.rows.shape:
+            counts = f"{len(state['samplers'])} numbers then, {len(self.param_table.names)} now"
+            raise NumberError(f"{self.layout.task}: saved by another version of the task, {counts}: begin anew")
         for name, array in self._arrays.items():
             if array.size:
                 assign_rows(array, state[name])

@@ -78,7 +78,8 @@ def fit_logs(options: FitOptions, console: Console) -> None:
 
 def _held_out(count: int) -> NDArray[np.bool_]:
     """Which segments of a flight are not learnt from: each fifth, so that all are learnt of one of four."""
-    return np.arange(count) % _HELD_OUT == _HELD_OUT - 1
+    held: NDArray[np.bool_] = np.arange(count) % _HELD_OUT == _HELD_OUT - 1
+    return held
 
 
 def _start(options: FitOptions) -> Fittable:

@@ -10,6 +10,7 @@ from policies.tasks.catalogue import UnknownTask, build_task, task_settings
 from policies.tasks.drive.drive import rtk_sensors
 from policies.tasks.flight.hover_bank import HOVER_COUNT, PLAIN, hover_bank
 from policies.tasks.flight.standing_bank import standing_bank
+from policies.tasks.task_params import NumberError
 from sim.sensors.sensors import sensor_model
 from sim.world.world import build_world
 
@@ -85,6 +86,15 @@ def test_flights_have_the_roughness_that_is_asked_for():
     rig = flight_rig(config, load_airframe("x500"), build_world(PLAIN))
     model = rig.arrays.sensor_model.numpy()[0]
     assert model["mag"]["white_std"] == pytest.approx(22e-3, rel=0.01)
+
+
+def test_a_state_of_a_version_with_other_numbers_is_refused():
+    task = follow()
+    task.reset(0)
+    state = task.state()
+    state["samplers"] = state["samplers"][:-1]
+    with pytest.raises(NumberError, match="another version"):
+        task.load_state(state)
 
 
 def test_a_state_with_several_airframes_is_gone_on_with():
