@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from mission.dataset.show import write_figure
 from sim.bodies.fit.least_squares import Errors, Fit
 from sim.bodies.fit.numbers import NUMBERS, Fittable, value_of
 from sim.bodies.fit.segments import SEGMENT_S, WINDOW_S, Segments
@@ -71,6 +70,8 @@ def draw(held: Segments, before: Prediction, after: Prediction, target: Path) ->
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
+
+    from mission.dataset.show import write_figure
 
     (vel_ned, omega_frd), (vel_begun, omega_begun) = held.flown, held.begun
     changes = vel_ned - vel_begun, omega_frd - omega_begun
