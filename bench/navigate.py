@@ -93,9 +93,10 @@ def build(
     name: str = "Navigate",
     seed: int = SEED,
     scan_lag_s: float = 0.0,
+    split: str = "test",
 ) -> Navigate:
     """Held-out environments of one density."""
-    task = build_task(name, episodes, task_settings(name, settings | {"split": "test"}))
+    task = build_task(name, episodes, task_settings(name, settings | {"split": split}))
     if not isinstance(task, Navigate):
         raise TypeError(task)
     task.set_params({"trees_per_ha": trees_per_ha, "scan_lag_s": scan_lag_s})

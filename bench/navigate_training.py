@@ -21,7 +21,6 @@ SEEDS = (1, 2, 3)
 LAGS_S = (0.0, 0.1, 0.2)
 TREES_PER_HA = 600.0
 EPISODES = 250  # of each lag
-SEED = 2_000_003  # of the validation forests
 RESULTS = Path("results")
 CHOSEN = RESULTS / "navigate-chosen.pt"
 HEAD = (
@@ -74,7 +73,7 @@ def judged(path: Path) -> Judged:
     settings = {key: str(value) for key, value in card.settings.items()} | {"has_estimator": "true"}
     flights = []
     for lag_s in LAGS_S:
-        task = build(settings, TREES_PER_HA, EPISODES, seed=SEED, scan_lag_s=lag_s)
+        task = build(settings, TREES_PER_HA, EPISODES, scan_lag_s=lag_s, split="validation")
         task.layout.require(policy.layout, str(path))
         flights.append(fly(policy, task))
     return Judged(path, tuple(flights))

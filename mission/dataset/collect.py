@@ -10,6 +10,7 @@ from mission.console.terminal import print_line
 from mission.dataset.shards import Collectors, ShardOrder, collect_shards, shard_orders
 from mission.dataset.write_episodes import EXPERT, RANDOM, CollectOptions, write_episodes
 from mission.train.play import PlayError
+from policies.datasets.episodes import DatasetError
 from policies.datasets.reader import DatasetReader
 from policies.experts.demonstration_file import check_is_free
 from policies.learn.export.policy_path import CheckpointError, find_policy
@@ -20,7 +21,7 @@ def collect_dataset(options: CollectOptions, console: Console) -> None:
 
     Raises:
         UnknownTask, NoExpert, PlayError, LayoutError: the task, its settings or the policy cannot be used.
-        DatasetError: the task shows images, or the dataset cannot be written.
+        DatasetError: the task shows images, shards are given numbers, or the dataset cannot be written.
         DemonstrationFileError: the same.
     """
     check_is_free(options.out)
@@ -47,6 +48,8 @@ def _collect_shards(options: CollectOptions, count: int, note: Callable[[int], N
         weights, policy = path.read_bytes(), path.stem
     else:
         policy = options.policy
+    if options.numbers:
+        raise DatasetError("numbers of the task cannot be given to shards: collect in one go")
     whole = ShardOrder(
         0, options.task, policy, options.episodes, options.noise, options.seed, options.env_args, weights
     )

@@ -8,7 +8,7 @@ from mission.flight_config import FlightConfig
 from mission.simulator.rig_choice import rig_with
 from sim.bodies.vehicles import class_of
 from sim.rig import Rig
-from sim.sensors.sensors import sensor_model
+from sim.sensors.sensors import SensorModel, sensor_model
 from sim.wind import WindModel, wind_model
 from sim.world.batch import grown_world
 from sim.world.world import WorldMap, build_world
@@ -29,6 +29,12 @@ def flight_wind(speed_m_s: float, from_deg: float) -> WindModel:
     return wind_model(speed_m_s, from_deg, TURBULENCE, GUST_FRACTION * speed_m_s)
 
 
+def flight_sensors(config: FlightConfig) -> SensorModel:
+    """The sensors of a flight."""
+    model: SensorModel = sensor_model(config.noise, config.home, config.sensor_roughness)
+    return model
+
+
 def flight_rig(
     config: FlightConfig, airframe: Airframe, world: WorldMap, make_rig: Callable[..., Rig] | None = None
 ) -> Rig:
@@ -44,7 +50,7 @@ def flight_rig(
     rig = (make_rig or rig_with(config.engine, airframe))(
         airframe,
         world,
-        sensor_model(config.noise, config.home, config.sensor_roughness),
+        flight_sensors(config),
         flight_wind(config.wind_m_s, config.wind_from_deg),
         home=config.home,
         seed=config.seed,

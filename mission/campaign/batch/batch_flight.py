@@ -11,11 +11,10 @@ from mission.flight_config import FlightConfig, flight_parameters
 from mission.log.flight_recorder import History
 from mission.scenario.scenario import Scenario
 from mission.simulator.failure_injection import RigInjector
-from mission.simulator.flight_rig import flight_wind
+from mission.simulator.flight_rig import flight_sensors, flight_wind
 from mission.simulator.host_ports import host_ports
 from sim.bodies.vehicles import class_of
 from sim.rig import Rig
-from sim.sensors.sensors import sensor_model
 from sim.world.world import WorldMap
 
 
@@ -37,7 +36,7 @@ class BatchFlight(FlightBase):
         row: Any = RowRig(rig, i_vehicle)
         self.rig = row
         row.seed(config.seed)
-        row.set_sensors(sensor_model(config.noise, config.home, config.sensor_roughness))
+        row.set_sensors(flight_sensors(config))
         row.set_air(flight_wind(config.wind_m_s, config.wind_from_deg))
         if scenario.wind.turbulence_m_s is not None:
             self.set_air(scenario.wind.speed_m_s, scenario.wind.from_deg, scenario.wind.turbulence_m_s)

@@ -27,10 +27,9 @@ from mission.scenario.judging.judge import judge
 from mission.scenario.result import ScenarioResult
 from mission.scenario.runner import AFTER_S
 from mission.scenario.scenario import Scenario
-from mission.simulator.flight_rig import flight_wind, flight_world
+from mission.simulator.flight_rig import flight_sensors, flight_wind, flight_world
 from sim.bodies.vehicles import class_of
 from sim.rig import Rig
-from sim.sensors.sensors import sensor_model
 
 QUIET_US = 5 * FRAME_US  # while a script waits, its flight controller's Python part looks ten times a second
 
@@ -116,7 +115,7 @@ def _rig(config: FlightConfig, world: Any, count: int) -> Rig:
     airframe = load_airframe(config.airframe)
     vehicle, body = class_of(airframe)
     return Rig(
-        airframe, world, sensor_model(config.noise, config.home, config.sensor_roughness),
+        airframe, world, flight_sensors(config),
         flight_wind(config.wind_m_s, config.wind_from_deg), home=config.home, vehicle_count=count, body=body,
         law=vehicle.law, start_ne_m=config.start_ne_m, heading_deg=config.start_heading_deg,
     )  # fmt: skip

@@ -7,6 +7,7 @@ the other even ones in validation.
 import warp as wp
 
 from common.rng import draw_key
+from policies.tasks.flight.settings import SPLITS
 
 wp.set_module_options({"enable_backward": False})
 
@@ -15,9 +16,8 @@ NOISE_STREAM = wp.constant(2)
 HOVER_STREAM = wp.constant(3)
 WIND_STREAM = wp.constant(4)
 PATH_STREAM = wp.constant(5)
-SPLITS = ("train", "validation", "test")
-_VALIDATION = wp.constant(1)
-_TEST = wp.constant(2)
+_VALIDATION = wp.constant(SPLITS.index("validation"))
+_TEST = wp.constant(SPLITS.index("test"))
 _SEED_BITS = wp.constant(wp.uint32(0x3FFFFFFF))
 
 

@@ -12,8 +12,7 @@ import numpy as np
 from autopilot.params import parameter_table
 from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
-from policies.tasks.flight.episode_draws import SPLITS
-from policies.tasks.flight.settings import RigSplit
+from policies.tasks.flight.settings import SPLITS, RigSplit
 from sim.bodies.vehicles import class_of
 from sim.hovering import Hover, fly_to_hover
 from sim.rig import Rig, Rows
@@ -73,7 +72,7 @@ def hover_bank(
     if len(airframes) == 1:
         return _hovering(has_estimator, device, heights_m, split, airframes[0])
     parts = [hover_bank(has_estimator, device, heights_m, split, (name,)) for name in airframes]
-    bank = _parked(has_estimator, device, HOVER_COUNT * len(parts), airframes[0], seed=0)
+    bank = _on_the_ground(has_estimator, device, HOVER_COUNT * len(parts), airframes[0], seed=0)
     bank.restore([_joined(rows) for rows in zip(*(part.snapshot() for part in parts), strict=True)])
     return bank
 
@@ -84,7 +83,7 @@ def _joined(parts: tuple[Rows, ...]) -> Rows:
     return np.concatenate(parts, out=joined, casting="unsafe")
 
 
-def _parked(has_estimator: bool, device: str, count: int, airframe_name: str, seed: int) -> Rig:
+def _on_the_ground(has_estimator: bool, device: str, count: int, airframe_name: str, seed: int) -> Rig:
     plain = build_world(PLAIN, device)
     return build_rig(
         plain,
@@ -101,7 +100,7 @@ def _hovering(
     has_estimator: bool, device: str, heights_m: tuple[float, float], split: RigSplit, airframe_name: str
 ) -> Rig:
     seed = SPLITS.index(split)
-    rig = _parked(has_estimator, device, HOVER_COUNT, airframe_name, seed)
+    rig = _on_the_ground(has_estimator, device, HOVER_COUNT, airframe_name, seed)
     rng = np.random.default_rng(seed)
     low, high = heights_m
     middle, spread = np.array([0.0, 0.0, -0.5 * (low + high)]), np.array([_SPREAD_M, _SPREAD_M, 0.5 * (high - low)])

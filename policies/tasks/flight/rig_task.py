@@ -11,11 +11,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from policies.tasks.flight.episode_draws import SPLITS
 from policies.tasks.flight.episode_start import Start
 from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT, Makes
 from policies.tasks.flight.hover_bank import AIRFRAME, LOW_M, build_rig, hover_bank
-from policies.tasks.flight.settings import RigSplit
+from policies.tasks.flight.settings import SPLITS, RigSplit
 from policies.tasks.layout import Layout
 from policies.tasks.task import Task
 from policies.tasks.task_params import Sampler

@@ -1,10 +1,11 @@
 """What users may choose of every task that is flown or driven."""
 
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
 from policies.tasks.task import TaskSettings
 
 RigSplit = Literal["train", "validation", "test"]
+SPLITS: tuple[RigSplit, ...] = get_args(RigSplit)
 
 
 class RigSettings(TaskSettings):

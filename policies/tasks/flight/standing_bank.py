@@ -12,9 +12,8 @@ import warp as wp
 
 from autopilot.control.law import ControlLaw
 from autopilot.navigator.setpoint import SetpointPort
-from policies.tasks.flight.episode_draws import SPLITS
 from policies.tasks.flight.hover_bank import PLAIN, build_rig
-from policies.tasks.flight.settings import RigSplit
+from policies.tasks.flight.settings import SPLITS, RigSplit
 from sim.advance import rig_arrays
 from sim.bodies.body import Body
 from sim.hovering import ALIGN_TICKS
