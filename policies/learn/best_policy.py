@@ -4,6 +4,7 @@ In: the policy at each judgement. Out: a copy of the best, with its card; it goe
 """
 
 import copy
+import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
@@ -19,13 +20,14 @@ class BestPolicy:
     def __init__(self) -> None:
         self.judged: Evaluation | None = None
         """The judgement of the best."""
+        self._worth = -math.inf
         self._record: dict[str, Any] = {}
         self._card: dict[str, Any] = {}
 
-    def offer(self, policy: Policy, card: PolicyCard, judged: Evaluation) -> None:
-        """Keeps a copy if none was as good; of equals the later, which learned longer."""
-        if self.judged is None or judged.success_rate >= self.judged.success_rate:
-            self.judged = judged
+    def offer(self, policy: Policy, card: PolicyCard, judged: Evaluation, worth: float) -> None:
+        """Keeps a copy if none was worth as much; of equals the later, which learned longer."""
+        if worth >= self._worth:
+            self.judged, self._worth = judged, worth
             self._record = copy.deepcopy(policy_record(policy))
             self._card = asdict(card)
 
@@ -36,9 +38,11 @@ class BestPolicy:
     def state(self) -> dict[str, Any]:
         """Everything, as plain values and tensors."""
         judged = asdict(self.judged) if self.judged is not None else None
-        return {"judged": judged, "policy": self._record, "card": self._card}
+        return {"judged": judged, "worth": self._worth, "policy": self._record, "card": self._card}
 
     def load_state(self, state: Mapping[str, Any]) -> None:
         """Restores what `state` returned."""
         self.judged = Evaluation(**state["judged"]) if state["judged"] is not None else None
         self._record, self._card = state["policy"], state["card"]
+        rate = self.judged.success_rate if self.judged is not None else -math.inf
+        self._worth = state.get("worth", rate)  # not in checkpoints of before evaluations counted

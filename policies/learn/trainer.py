@@ -188,8 +188,11 @@ class Training:
             iteration = self.learner.iterate()
             steps = self.learner.steps
             self.period.add(iteration.scores, iteration.statistics)
-            if iteration.is_evaluation:
+            if iteration.evaluation is not None:
                 self.recent.clear()
+                if self.behavior.keep_best:
+                    judged = iteration.evaluation
+                    self._best.offer(self.learner.policy, self._card(), judged, judged.mean_return)
             self.recent.add(iteration.scores)
             self._moments.append((wall_time_s(), steps))
             self.watcher.show(self._progress())
@@ -226,8 +229,8 @@ class Training:
             if self._judged is not None:
                 values["Environment/Judged Success Rate"] = self._judged.success_rate
                 is_reached = self._target.is_reached(self._judged)
-                if self.behavior.keep_best:
-                    self._best.offer(self.learner.policy, self._card(), self._judged)
+                if self.behavior.keep_best and not self.behavior.is_offline:
+                    self._best.offer(self.learner.policy, self._card(), self._judged, self._judged.success_rate)
         self._events.write(self.learner.steps, values)
         return is_reached
 

@@ -23,10 +23,8 @@ from policies.offline.algorithm import OfflineAlgorithm
 from policies.offline.draws import Draws
 from policies.offline.scores import normalized_score, scores_of
 from policies.offline.store import OfflineStore
-from policies.tasks.task import Scores
 
 BLOCK_STEPS = 200  # gradient steps of an iteration, whose minibatches are drawn at once
-_NO_SCORES = scores_of(None)
 
 Judge = Callable[[Policy], Evaluation]
 
@@ -82,22 +80,20 @@ class OfflineLearner:
         self.steps += steps
         statistics = dict(zip(self.algorithm.tags, averaged(torch.stack(made).mean(dim=0)).tolist(), strict=True))
         statistics["Policy/Learning Rate"] = rate
-        scores = _NO_SCORES
         interval = self._settings.evaluation_interval
         is_due = self.steps // interval > before // interval or self.steps >= self._behavior.max_steps
-        is_evaluation = bool(self._settings.evaluation_episodes) and is_due and rank() == 0
-        if is_evaluation:
-            scores = self._evaluate(statistics)
-        return Iteration(steps, scores, statistics, is_evaluation)
+        is_judged = bool(self._settings.evaluation_episodes) and is_due and rank() == 0
+        evaluation = self._evaluate(statistics) if is_judged else None
+        return Iteration(steps, scores_of(evaluation), statistics, evaluation)
 
-    def _evaluate(self, statistics: dict[str, float]) -> Scores:
+    def _evaluate(self, statistics: dict[str, float]) -> Evaluation:
         """Plays the policy; its mean return and score become statistics."""
         evaluation = self._judge(self.policy)
         statistics["Offline/Mean Return"] = evaluation.mean_return
         if self._settings.reference_returns is not None:
             score = normalized_score(evaluation.mean_return, self._settings.reference_returns)
             statistics["Offline/Normalized Score"] = score
-        return scores_of(evaluation)
+        return evaluation
 
     def restart(self) -> None:
         """No episode is going on."""

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 from torch import Tensor, nn
 
+from policies.learn.evaluate import Evaluation
 from policies.learn.networks.policy import Policy
 from policies.tasks.task import Scores
 
@@ -21,7 +22,7 @@ class Iteration:
     steps: int  # decisions collected, over all environments
     scores: Scores  # of the episodes that ended meanwhile
     statistics: Mapping[str, float]  # TensorBoard tag to value, ML-Agents' names: "Losses/Policy Loss"
-    is_evaluation: bool = False  # whether the episodes are all of one policy: those before do not count any more
+    evaluation: Evaluation | None = None  # of the policy, whose episodes these are: those before do not count any more
 
 
 class Learner(Protocol):

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from policies.learn.checkpoint import checkpoints, load, save
 from policies.learn.config.run import RunConfig
-from policies.learn.evaluate import evaluate
+from policies.learn.evaluate import Evaluation, evaluate
 from policies.learn.export.policy_file import CHECKPOINT, load_policy
 from policies.learn.export.policy_path import CheckpointError
 from policies.learn.rollout.demonstrations import DemonstrationError
@@ -96,6 +96,23 @@ def test_a_trained_policy_is_a_policy_as_all_others(tmp_path, roller_ball):
     curves = next((tmp_path / "run" / "B").glob("events.out.tfevents.*")).read_bytes()
     for tag in (b"Losses/Critic Loss", b"Offline/Normalized Score", b"Environment/Cumulative Reward"):
         assert tag in curves
+
+
+def test_the_policy_that_returned_most_is_what_training_ends_with(tmp_path, roller_ball):
+    best = {"trainer_type": "bc", "keep_best": True, "max_steps": 600}
+    offline = {"evaluation_interval": 200, "evaluation_episodes": 8}
+    training = Training(config(tmp_path, roller_ball, best, offline=offline), StopAfter())
+    judgements, seen = iter((1.0, 3.0, 2.0)), []
+
+    def judge(policy):
+        seen.append({name: value.clone() for name, value in policy.state_dict().items()})
+        return Evaluation({"success": 1, "timeout": 7}, next(judgements), 10.0)
+
+    training.learner._judge = judge
+    result = training.run()
+    policy, card = load_policy(result.policy)
+    assert same(dict(policy.state_dict()), seen[1])
+    assert card.steps == 400
 
 
 def test_a_run_is_not_gone_on_with_on_other_data(tmp_path, roller_ball):
