@@ -1,11 +1,12 @@
-"""`python -m bench.follow.choice POLICY…`: which of some policies without images is best, by worlds of validation.
+"""`python -m bench.follow.choice POLICY…`: which of some policies of following is best, by worlds of validation.
 
-In: policy files of FollowMe with `observation=tracked`, such as the checkpoints of several seeds. Out: how long each
-stays in the band in what such policies are trained in, under the guard's rule of the owner, with 95 % intervals, best
-first by where the interval begins. The episodes, of split `validation`, are not flown in a test, nor trained on since
-there is that split.
+In: policy files of FollowMe that all see the same, such as several seeds of a recipe. Out: how long each stays in the
+band, with 95 % intervals, best first by where the interval begins; those with `observation=tracked` fly under the
+guard's rule of the owner. The episodes, of split `validation`, are not flown in a test, nor trained on since there is
+that split.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -20,6 +21,7 @@ from policies.tasks.catalogue import task_settings
 from policies.tasks.follow_me.follow_me import FollowMe
 from policies.tasks.follow_me.scorecard import Scorecard, scorecard, written
 from policies.tasks.follow_me.settings import FollowSettings
+from policies.tasks.task_params import Sampler
 
 WIDE = "x500+f450+f550"
 
@@ -28,23 +30,25 @@ def main(
     policies: list[Path],
     airframe: Annotated[str, typer.Option(help="Of several with + between them one is drawn per episode.")] = WIDE,
     episodes: Annotated[int, typer.Option(min=2, help="Of each policy.")] = 256,
+    drawn_as: Annotated[Path | None, typer.Option(help="Conditions: as this policy's training drew them.")] = None,
 ) -> None:
-    found = {path: judged(path, airframe, episodes) for path in track(policies, "judging", transient=True)}
+    numbers = load_policy(drawn_as)[1].samplers() if drawn_as is not None else {}
+    found = {path: judged(path, airframe, episodes, numbers) for path in track(policies, "judging", transient=True)}
     table = Table("policy", "in band", "collided")
     for path, card in sorted(found.items(), key=lambda pair: -pair[1].in_band.low):
         table.add_row(str(path), written(card.in_band, "%"), written(card.collision, "%"))
     Console().print(table)
 
 
-def judged(path: Path, airframe: str, episodes: int) -> Scorecard:
-    """A policy in worlds of validation, on the flight controller's estimate."""
+def judged(path: Path, airframe: str, episodes: int, numbers: Mapping[str, Sampler]) -> Scorecard:
+    """A policy in worlds of validation, on the flight controller's estimate; other numbers are the preset's."""
     policy, card = load_policy(path)
     changed = {"split": "validation", "airframe": airframe, "has_estimator": "true", "terrain": "fresh"}
     settings = task_settings("FollowMe", {key: str(value) for key, value in card.settings.items()} | changed)
     assert isinstance(settings, FollowSettings)
     task = FollowMe(settings, episodes)
     task.layout.require(policy.layout, str(path))
-    tracks, _ = first_episodes(policy, task, {})
+    tracks, _ = first_episodes(policy, task, numbers)
     return scorecard(tracks)
 
 

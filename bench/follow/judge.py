@@ -18,6 +18,7 @@ from policies.tasks.follow_me.scorecard import scorecard
 from policies.tasks.follow_me.settings import FollowSettings
 from policies.tasks.follow_me.track import Track
 from policies.tasks.follow_me.track_recording import Recording
+from policies.tasks.task_params import Sampler
 
 EPISODES = 64  # of each cell
 HELD_OUT_SEED = 1_000_003  # no training run is given it
@@ -50,7 +51,7 @@ def scorecards(
     return judged
 
 
-def first_episodes(policy: Policy, task: FollowMe, numbers: Mapping[str, float]) -> tuple[list[Track], float]:
+def first_episodes(policy: Policy, task: FollowMe, numbers: Mapping[str, float | Sampler]) -> tuple[list[Track], float]:
     """The first episode of every environment, by the most probable actions; their tracks and mean reward."""
     task.set_params(numbers)
     task.reset(HELD_OUT_SEED)
