@@ -119,12 +119,13 @@ class CompanionLog:
     """A log of a companion's own: `decisions.ulg`, and the images beside it."""
 
     def __init__(self, companion: Companion, folder: Path, pilot: str, tell: Callable[[str], None]) -> None:
-        layout = companion.skill.record_layout
-        about = topic_info(layout, pilot, companion.skill.stances)
+        skill = companion.skill
+        layout, image_layout = skill.record_layout, skill.image_layout
+        about = topic_info(layout, pilot, skill.stances, image_layout)
         info: dict[str, Any] = {"sys_name": "honeyguide companion", **about}
         self._log = UlogWriter(folder / COMPANION_LOG, 0, info, {}, on_trouble=tell)
-        topic = self._log.add_topic(TOPIC, topic_fields(layout))
-        images = ImageFile(folder / IMAGES_FILE, tell) if companion.skill.camera is not None else None
+        topic = self._log.add_topic(TOPIC, topic_fields(layout, image_layout))
+        images = ImageFile(folder / IMAGES_FILE, tell) if skill.camera is not None else None
         self._recording = DecisionRecording(companion, topic.write_row, images)
 
     def close(self) -> None:

@@ -17,7 +17,9 @@ def record_flight(flight: FlightBase, companion: Companion, folder: Path, pilot:
         folder: of the run.
         pilot: who decides, for the log.
     """
-    layout = companion.skill.record_layout
-    write = flight.recorder.keep_topic(TOPIC, topic_fields(layout), topic_info(layout, pilot, companion.skill.stances))
-    images = ImageFile(folder / IMAGES_FILE, flight.troubles.note) if companion.skill.camera is not None else None
+    skill = companion.skill
+    layout, image_layout = skill.record_layout, skill.image_layout
+    about = topic_info(layout, pilot, skill.stances, image_layout)
+    write = flight.recorder.keep_topic(TOPIC, topic_fields(layout, image_layout), about)
+    images = ImageFile(folder / IMAGES_FILE, flight.troubles.note) if skill.camera is not None else None
     return DecisionRecording(companion, write, images)

@@ -103,14 +103,17 @@ class Companion:
         elif orders.wish is not Wish.NONE:
             vehicle.ask_for(orders.wish)
         self._switch(orders.sending, time_us)
-        has_decided = has_sensed and not blindness and self._decide(time_us) and orders.sending is Sending.POLICY
+        has_looked = has_sensed and not blindness and self._decide(time_us)
+        has_decided = has_looked and orders.sending is Sending.POLICY
         is_sending = orders.sending is not Sending.NOTHING or self._sticks is not None
         if is_sending and (has_decided or time_us >= self._setpoint_due_us):
             self._setpoint_due_us = time_us + SETPOINT_US
             self._send()
         if has_decided and begun_s is not None and self._wall_s is not None:
             self.latencies_s.append(self._wall_s() - begun_s)
-        if has_sensed:  # only now: the setpoint does not wait for it
+        if has_looked and self.on_decision is not None:  # only now: the setpoint waits for no disk,
+            self.on_decision(self._noted(time_us, is_flying=orders.sending is Sending.POLICY))
+        if has_sensed:  # and not for this either
             skill.conclude(vehicle.own)
 
     @property
@@ -154,8 +157,6 @@ class Companion:
             self._action = action
             self._setpoint = self.skill.setpoint(action, own)
             self.decision_count += 1
-        if self.on_decision is not None:
-            self.on_decision(self._noted(time_us, is_flying=is_flying))
         return True
 
     def _noted(self, time_us: int, *, is_flying: bool) -> Decision:
@@ -170,6 +171,7 @@ class Companion:
             is_flying=is_flying,
             is_first=is_first,
             frame=skill.recorded_frame(own, flown, time_us, is_flying=is_flying),
+            vector=None if skill.image_layout is None else skill.seen,
             action=self.action if is_flying else np.full(skill.action_size, np.nan, np.float32),
             wanted=skill.wanted if is_flying else flown,
             flown=flown,

@@ -22,6 +22,7 @@ from policies.tasks.layout import Layout
 
 TOPIC = "policy_decision"
 LAYOUT_KEY, PILOT_KEY, GUARD_KEY = "decision_layout", "decision_pilot", "decision_guard"  # of the log's information
+IMAGE_LAYOUT_KEY = "decision_image_layout"  # where a pilot decides on an image
 _TEXT_MAX = 60_000  # [byte] of one piece of information
 NO_GOAL: Vector = (nan, nan, nan)
 
@@ -35,6 +36,7 @@ class Decision:
     is_flying: bool  # False: somebody else flies, and `action` is none
     is_first: bool  # since it took over, or let go
     frame: Floats  # the newest frame of the observation, (elements,)
+    vector: Floats | None  # beside the image, of a pilot that decides on both, (elements,)
     action: Floats  # in [-1, 1], (actions,); NaN: none
     wanted: Velocity  # what the action asks for
     flown: Velocity  # what was sent, as a guard let it; of who else flies: how the vehicle moves
@@ -60,8 +62,14 @@ def motion_along_nose(own: Own) -> Velocity:
     return (speed, 0.0, 0.0), own.omega_frd[2]
 
 
-def topic_fields(layout: Layout) -> dict[str, str]:
-    """The topic's ULog fields, in the order of `topic_row`."""
+def topic_fields(layout: Layout, image_layout: Layout | None = None) -> dict[str, str]:
+    """The topic's ULog fields, in the order of `topic_row`.
+
+    Args:
+        layout: of frames.
+        image_layout: of vectors and images; None: its pilot decides on no image.
+    """
+    vector = {} if image_layout is None else {"vector": f"float[{image_layout.frame_size}]"}
     return {
         "boot_us": "uint64_t",
         "frame": f"float[{layout.frame_size}]",
@@ -73,6 +81,7 @@ def topic_fields(layout: Layout) -> dict[str, str]:
         **dict.fromkeys(("is_flying", "is_first"), "bool"),
         "guard_stance": "uint8_t",  # its place in the information's list, from 1; 0: no guard has looked
         "guard_reasons": "uint16_t",  # a bit for each that the information lists
+        **vector,
     }
 
 
@@ -96,14 +105,22 @@ def topic_row(decision: Decision, i_image: int, stances: Sequence[str]) -> tuple
         decision.is_first,
         stances.index(decision.stance) + 1 if decision.stance else 0,
         sum(1 << place for place, reason in enumerate(REASONS) if reason in decision.reasons),
+        *(() if decision.vector is None else map(float, decision.vector)),
     )
 
 
-def topic_info(layout: Layout, pilot: str, stances: Sequence[str]) -> Mapping[str, Sequence[str]]:
+def topic_info(
+    layout: Layout, pilot: str, stances: Sequence[str], image_layout: Layout | None = None
+) -> Mapping[str, Sequence[str]]:
     """What the topic is read with; texts by key."""
-    text = json.dumps(layout.record())
-    return {
-        LAYOUT_KEY: [text[at : at + _TEXT_MAX] for at in range(0, len(text), _TEXT_MAX)],
+    info = {
+        LAYOUT_KEY: _texts(layout),
         PILOT_KEY: [pilot],
         GUARD_KEY: [json.dumps({"stances": stances, "reasons": REASONS})],
     }
+    return info if image_layout is None else info | {IMAGE_LAYOUT_KEY: _texts(image_layout)}
+
+
+def _texts(layout: Layout) -> Sequence[str]:
+    text = json.dumps(layout.record())
+    return [text[at : at + _TEXT_MAX] for at in range(0, len(text), _TEXT_MAX)]

@@ -12,14 +12,34 @@ from numpy.typing import NDArray
 
 from common.attitude import Vector, rotated
 from common.warp_start import start_warp
+from policies.companion.names import TASK
 from policies.companion.vehicle_link import Own, Owner
-from policies.tasks.flight.own_state import Command, OwnState, command_rows
-from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, observe_rows, vector_elements
+from policies.tasks.flight.own_state import ACTIONS, Command, OwnState, command_rows
+from policies.tasks.follow_me.observe import (
+    IMAGE_CHANNELS,
+    IMAGE_SIZE,
+    LAYOUT_VERSION,
+    REPORT_OLD_S,
+    OwnerReport,
+    observe_rows,
+    vector_elements,
+)
+from policies.tasks.layout import ImageElement, Layout
 
 HEIGHT_OLD_US = 500_000  # a range measured longer ago tells nothing of the ground below
 REPORT_LAG_S = 0.3  # of a phone's position when it arrives; guess: phones do not say, their clock is not ours
 
 Floats = NDArray[np.float32]
+
+
+def image_layout(kind: int) -> Layout:
+    """What a policy that looks at images sees and says.
+
+    Args:
+        kind: which vector: EGO or EGO_BLIND of the task's observe.py.
+    """
+    image = ImageElement(IMAGE_SIZE, IMAGE_SIZE, IMAGE_CHANNELS)
+    return Layout(TASK, LAYOUT_VERSION, vector_elements(kind), ACTIONS, image=image)
 
 
 class CommandKernel:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from common.attitude import Vector
 from policies.companion.belief import owner_belief
 from policies.companion.names import SCRIPTED, TASK
+from policies.companion.observation import image_layout
 from policies.companion.skills.following import Pilot
 from policies.experts.follower import ScriptedFollower
 from policies.learn.export.policy_file import load_policy
@@ -30,7 +31,7 @@ from policies.tasks.follow_me.observe import (
     vector_elements,
 )
 from policies.tasks.follow_me.tracked.vector import TRACKED_ELEMENTS
-from policies.tasks.layout import ImageElement, Layout, LayoutError
+from policies.tasks.layout import Layout, LayoutError
 
 Floats = NDArray[np.float32]
 
@@ -58,10 +59,8 @@ class LearnedPilot:
         layout = policy.layout
         is_blind = len(layout.frame) == len(vector_elements(int(EGO_BLIND)))
         self.kind = int(EGO_BLIND) if is_blind else int(EGO)
-        image = ImageElement(IMAGE_SIZE, IMAGE_SIZE, IMAGE_CHANNELS)
-        here = Layout(TASK, LAYOUT_VERSION, vector_elements(self.kind), ACTIONS, image=image)
         try:
-            here.require(layout, source)
+            image_layout(self.kind).require(layout, source)
         except LayoutError as error:
             raise PilotError(str(error)) from error
         self._policy = policy

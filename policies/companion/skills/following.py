@@ -17,7 +17,7 @@ from policies.companion.guard.guard import Guard, Stance
 from policies.companion.guard.interventions import BeginningReasons, Interventions
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
-from policies.companion.observation import Observer
+from policies.companion.observation import Observer, image_layout
 from policies.companion.owner_watch import OwnerWatch
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Floats, Velocity
@@ -25,6 +25,7 @@ from policies.companion.tracked_observer import TrackedObserver
 from policies.companion.tracked_recorder import RECORD_LAYOUT, TrackedRecorder
 from policies.companion.vehicle_link import Own, Owner, VehicleLink
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, TILT_DEG, TRACKED
+from policies.tasks.layout import Layout
 
 DECISION_US = 100_000
 DECISION_EARLY_US = 50_000  # an image may come this much earlier than the decision period asks
@@ -227,6 +228,10 @@ class Following:
         return allowed
 
     record_layout = RECORD_LAYOUT
+
+    @property
+    def image_layout(self) -> Layout | None:
+        return None if self._tracked is not None else image_layout(self._pilot.kind)
 
     def keep_records(self) -> None:
         """Its decisions will be noted; before anything is received."""

@@ -110,6 +110,10 @@ class GoalSkill:
     def record_layout(self) -> Layout:
         return replace(self._pilot.task, stack=1)
 
+    @property
+    def image_layout(self) -> Layout | None:
+        return None
+
     def keep_records(self) -> None:
         """Has nothing to make ready."""
 

@@ -98,6 +98,11 @@ class Skill(Protocol):
         """Of what `recorded_frame` gives, one frame in a stack."""
         ...
 
+    @property
+    def image_layout(self) -> Layout | None:
+        """Of `seen` and `recorded_image` together, where its pilot decides on both; None: it decides on no image."""
+        ...
+
     def keep_records(self) -> None:
         """Its decisions will be noted; before anything is received."""
         ...
