@@ -9,6 +9,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,8 @@ from policies.learn.rollout.demonstrations import (
 from policies.tasks.layout import Layout
 from policies.tasks.settings_difference import settings_difference
 
-CHUNK_ROWS = 65_536  # read and written at once
+CHUNK_ROWS = 65_536  # read and written at once,
+_IMAGE_BYTES = 64 * 2**20  # of images at most
 _VERSION = 1  # of the table in cache files
 _DATA_FILE = "main_data.hdf5"
 _ENDS = 3  # columns behind the actions: reward, is_terminated, is_ended
@@ -55,20 +57,22 @@ def row_count(folders: Sequence[Path]) -> int:
     return count
 
 
-def chunks(folders: Sequence[Path], layout: Layout) -> Iterator[Chunk]:
-    """All rows of datasets in the order they were recorded, checked.
+def chunks(folders: Sequence[Path], layout: Layout, *, has_images: bool = True) -> Iterator[Chunk]:
+    """All rows of datasets in the order they were recorded, checked; without their images if they are not wanted.
 
     Raises:
         DemonstrationError: a dataset that cannot be read, or holds what the layout cannot.
     """
+    size = CHUNK_ROWS if layout.image is None else max(1, min(CHUNK_ROWS, _IMAGE_BYTES // prod(layout.image_shape)))
     for folder in folders:
         for source, group in _episodes(folder):
             count = len(group["rewards"])
             if not count:
                 raise DemonstrationError(f"{source}: has no decisions")
             _check_shapes(group, layout, source)
-            for first in range(0, count + 1, CHUNK_ROWS):
-                yield _chunk(group, layout, slice(first, min(first + CHUNK_ROWS, count + 1)), source)
+            for first in range(0, count + 1, size):
+                span = slice(first, min(first + size, count + 1))
+                yield _chunk(group, layout, span, source, has_images=has_images)
 
 
 def cache_name(folders: Sequence[Path], layout: Layout) -> str:
@@ -173,7 +177,7 @@ def _parts(group: Any, layout: Layout, source: str) -> tuple[Any, Any]:
     return observations["vector"], observations["image"]
 
 
-def _chunk(group: Any, layout: Layout, span: slice, source: str) -> Chunk:
+def _chunk(group: Any, layout: Layout, span: slice, source: str, *, has_images: bool) -> Chunk:
     """Rows of an episode; the last one of all has only an observation."""
     count = len(group["rewards"])
     done = slice(span.start, min(span.stop, count))
@@ -197,4 +201,4 @@ def _chunk(group: Any, layout: Layout, span: slice, source: str) -> Chunk:
     if decisions[~is_last, -1].any():
         raise DemonstrationError(f"{source}: goes on after a decision that ended it")
     decisions[is_last, -1] = 1.0  # what was cut without a word was cut
-    return Chunk(rows, None if images is None else np.asarray(images[span], np.uint8))
+    return Chunk(rows, np.asarray(images[span], np.uint8) if has_images and images is not None else None)

@@ -177,7 +177,7 @@ def _mapped(folders: Sequence[Path], layout: Layout, cache: Path, count: int) ->
         if path.exists():
             continue
         cache.mkdir(parents=True, exist_ok=True)
-        made = chunks(folders, layout)
+        made = chunks(folders, layout, has_images=dtype is np.uint8)
         blocks = (chunk.rows if dtype is np.float32 else chunk.images for chunk in made)
         write_table(path, shape, dtype, (block for block in blocks if block is not None))
     if cache == folders[0]:  # a folder of the user's choice may hold those of other datasets
