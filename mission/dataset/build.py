@@ -110,7 +110,7 @@ def _read(log: Path, judge: Judge, *, by_truth: bool) -> FlightSource:
     Raises:
         DatasetError: it cannot be read, or holds decisions of another task, version or setting.
     """
-    source = read_flight(log, by_truth=by_truth)
+    source = read_flight(log, by_truth=by_truth, by_images=judge.layout.image is not None)
     try:
         replace(judge.layout, stack=1).require(source.rows.layout, f"{log}: policy_decision")
     except LayoutError as error:
@@ -119,6 +119,7 @@ def _read(log: Path, judge: Judge, *, by_truth: bool) -> FlightSource:
 
 
 def _episodes(logs: list[Path], judge: Judge, options: BuildOptions, console: Console) -> Iterator[EpisodeRows]:
+    has_images = options.has_images or judge.layout.image is not None
     for log in logs:
         source = _read(log, judge, by_truth=options.has_truth)
         gaps = runs_of(source.rows, has_others=options.has_others).gaps
@@ -131,5 +132,5 @@ def _episodes(logs: list[Path], judge: Judge, options: BuildOptions, console: Co
             judge,
             source.truth,
             has_others=options.has_others,
-            images=source.images if options.has_images else lambda _: None,
+            images=source.images if has_images else lambda _: None,
         )

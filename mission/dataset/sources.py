@@ -21,7 +21,7 @@ from mission.log.replay_topic import OWNER, REPLAY_TOPIC
 from mission.log.ulog_file import UlogDamage, read_topics
 from mission.simulator.flight_rig import flight_world
 from mission.view.replay_file import ATTITUDE, CONFIG_KEY, PLACE, config_of, info_text
-from policies.companion.decision_log import LAYOUT_KEY, PILOT_KEY, TOPIC
+from policies.companion.decision_log import IMAGE_LAYOUT_KEY, LAYOUT_KEY, PILOT_KEY, TOPIC
 from policies.datasets.decisions import DecisionRows, TruthRows
 from policies.datasets.episodes import DatasetError
 from policies.tasks.layout import Layout
@@ -76,12 +76,14 @@ class FlightSource:
         """
         archive = self.path.parent / IMAGES_FILE
         if not archive.is_file():
-            raise DatasetError(f"{archive}: is missing: {self.path.name} was recorded without pictures")
+            raise DatasetError(f"{self.path}: {TOPIC}: was recorded without pictures: {archive.name} is missing")
+        if (numbers < 0).any():
+            raise DatasetError(f"{self.path}: {TOPIC}: {int((numbers < 0).sum())} decisions in a row have no picture")
         try:
             with zipfile.ZipFile(archive) as file:
                 return np.stack([read_image(file, int(number)) for number in numbers])
         except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-            raise DatasetError(f"{archive}: a picture of {self.path.name} is missing or damaged") from error
+            raise DatasetError(f"{self.path}: {TOPIC}: a picture in {archive.name} is missing or damaged") from error
 
 
 def has_truth(path: Path) -> bool:
@@ -95,23 +97,32 @@ def has_truth(path: Path) -> bool:
     return CONFIG_KEY in log.msg_info_multiple_dict and all(columns_of(log, name) is not None for name in topics)
 
 
-def read_flight(path: Path, *, by_truth: bool = True) -> FlightSource:
+def read_flight(path: Path, *, by_truth: bool = True, by_images: bool = False) -> FlightSource:
     """The decisions of a log, and the truth at each, if it is to be used and is there.
 
+    Args:
+        path: of the log.
+        by_truth: the truth is to be used.
+        by_images: what was seen are the vectors of a pilot that decides on images, and not frames.
+
     Raises:
-        DatasetError: the log cannot be read, or holds no decisions.
+        DatasetError: the log cannot be read, or holds no decisions, or none on images.
     """
     log = read_log(path, (TOPIC, PLACE, ATTITUDE, REPLAY_TOPIC.name, STEERING_TOPIC.name, SENSED))
     columns = columns_of(log, TOPIC)
     infos = log.msg_info_multiple_dict
     if columns is None or LAYOUT_KEY not in infos:
         raise DatasetError(f"{path}: has no topic {TOPIC}: it was not flown with --record")
+    if by_images and not (IMAGE_LAYOUT_KEY in infos and "vector[0]" in columns):
+        raise DatasetError(f"{path}: {TOPIC}: holds no vectors of a policy that looks at pictures: none flew")
+    layout_key = IMAGE_LAYOUT_KEY if by_images else LAYOUT_KEY
     try:
-        layout = Layout.from_record(json.loads(info_text(log, LAYOUT_KEY)))
+        layout = Layout.from_record(json.loads(info_text(log, layout_key)))
         config = config_of(info_text(log, CONFIG_KEY), path.parent) if CONFIG_KEY in infos else None
         arrays = {name: vector(columns, name) for name in ("frame", "action", "flown", "pos_ned", "vel_ned", "goal")}
         for name in ("yaw", "i_image", "is_flying", "is_first"):
             arrays[name] = columns[name]
+        arrays["seen"] = vector(columns, "vector") if by_images else arrays["frame"]
     except (KeyError, ValueError, TypeError) as error:
         raise DatasetError(f"{path}: {TOPIC}: damaged, or of another version") from error
     rows = DecisionRows(

@@ -28,10 +28,11 @@ class DecisionRows:
     """Decisions of one log, in order of time; columns as of `policies.companion.decision_log`."""
 
     source: str  # the log, for messages and metadata
-    layout: Layout  # of the frames
+    layout: Layout  # of what was seen, one frame in a stack
     pilot: str
     time_us: Rows  # (n,)
-    frame: Rows  # (n, elements)
+    frame: Rows  # (n, elements), by which a judge judges
+    seen: Rows  # (n, elements), the observations: frames, or vectors of a pilot that decides on images
     action: Rows  # (n, actions), NaN where another flew
     flown: Rows  # (n, 4)
     pos_ned: Rows
@@ -54,8 +55,8 @@ class DecisionRows:
 
 
 COLUMNS = (
-    "time_us", "frame", "action", "flown", "pos_ned", "vel_ned", "goal", "yaw", "i_image", "is_flying", "is_first",
-    "is_struck",
+    "time_us", "frame", "seen", "action", "flown", "pos_ned", "vel_ned", "goal", "yaw", "i_image", "is_flying",
+    "is_first", "is_struck",
 )  # fmt: skip
 
 
@@ -185,7 +186,7 @@ class _Judged:
 
 
 def _judged(run: DecisionRows, judge: Judge, truth: TruthRows | None) -> _Judged:
-    if not np.isfinite(run.frame).all():
+    if not (np.isfinite(run.frame).all() and np.isfinite(run.seen).all()):
         raise DatasetError(f"{run.source}: policy_decision holds an observation that is no number")
     actions = judge.actions(run)
     return _Judged(run, actions, *judge.judged(run, actions, truth))
@@ -211,7 +212,7 @@ def _episode(judged: _Judged, stack: int, images: Callable[[Rows], NDArray[np.ui
     steps = int(ended[0]) + 1 if len(ended) else len(outcomes)
     outcome = Outcome(int(outcomes[steps - 1]))
     return EpisodeRows(
-        observations=stacked(run.frame[: steps + 1], stack),
+        observations=stacked(run.seen[: steps + 1], stack),
         actions=judged.actions[:steps],
         rewards=judged.rewards[:steps].astype(np.float64),
         is_terminated=outcome is not Outcome.RUNNING and outcome is not Outcome.TIMEOUT,

@@ -25,7 +25,7 @@ class EpisodeRows:
     rewards: NDArray[np.float64]  # (steps,)
     is_terminated: bool  # by the last step; else the episode was cut there
     outcome: str  # as `Outcome`, in small letters
-    images: NDArray[np.uint8] | None = None  # (steps + 1, height, width, channels), beside the observations
+    images: NDArray[np.uint8] | None = None  # (steps + 1, height, width, channels); part of the observations or beside
     context: Mapping[str, str | float] = field(default_factory=dict)
     """Where it comes from and what it was flown in: source, airframe, wind."""
 
@@ -40,6 +40,8 @@ class EpisodeRows:
             raise DatasetError(
                 f"an episode of {steps} rewards has {len(self.observations)} observations, {len(self.actions)} actions"
             )
+        if self.images is not None and len(self.images) != steps + 1:
+            raise DatasetError(f"an episode of {steps + 1} observations has {len(self.images)} images")
         if not all(np.isfinite(array).all() for array in (self.observations, self.actions, self.rewards)):
             raise DatasetError("an episode holds a value that is not finite")
 

@@ -1,7 +1,7 @@
-"""Logged flights of a follower as episodes of FollowMe's tracked setting.
+"""Logged flights of a follower as episodes of FollowMe: of its tracked setting, or of that with images.
 
 In: decisions, and the truth where the log has it. Out: rewards and ends by the task's own functions, on the truth, or
-else on what the senses knew, which is in the observation.
+else on what the senses knew, which is in the frames of all followers' logs.
 """
 
 from typing import Any
@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from common.warp_start import start_warp
 from policies.datasets.decisions import DecisionRows, Rows, TruthRows
 from policies.datasets.follow_me_rows import action_rows, follow_rows, sight_rows
+from policies.datasets.goal_rows import navigate_action_rows
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS
 from policies.tasks.flight.own_state import Command
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.owner_visibility import ROOM_MAX_M, Sight
-from policies.tasks.follow_me.tracked.vector import REACH_M, SECTORS
+from policies.tasks.follow_me.tracked.vector import REACH_M, SECTORS, TRACKED_ELEMENTS
 from policies.tasks.layout import Layout
 from policies.tasks.task import Task
 from policies.tasks.task_params import typed_rows
@@ -30,10 +31,10 @@ _UNSEEN_AGE_S = 0.3  # by the senses: three images without the owner
 
 
 class FollowMeJudge:
-    """FollowMe's.
+    """FollowMe's in the tracked setting, where an action goes on from the last command.
 
     Args:
-        task: in the tracked setting.
+        task: in the setting whose dataset is built.
     """
 
     def __init__(self, task: Task) -> None:
@@ -41,9 +42,8 @@ class FollowMeJudge:
         self.layout: Layout = task.layout
         self._decision_s = task.decision_s
         self._params = wp.array(task.param_table.typical(), dtype=float)
-        elements = [element.name for element in self.layout.frame]
-        self._scale = np.array([element.scale for element in self.layout.frame], np.float32)
-        self._at = {name: k for k, name in enumerate(elements)}
+        self._scale = np.array([element.scale for element in TRACKED_ELEMENTS], np.float32)  # frames are always these
+        self._at = {element.name: k for k, element in enumerate(TRACKED_ELEMENTS)}
 
     def actions(self, run: DecisionRows) -> Rows:
         """The pilot's, or where a guard or another flew what leads there; clipped to [-1, 1]."""
@@ -115,6 +115,24 @@ class FollowMeJudge:
         index = np.arange(len(is_in_view))
         seen = np.maximum.accumulate(np.where(is_in_view > 0, index, 0))
         return ((index - seen) * self._decision_s).astype(np.float32)
+
+
+class ImageFollowMeJudge(FollowMeJudge):
+    """FollowMe's in the setting with images, where an action is a velocity and a yaw rate by itself."""
+
+    def actions(self, run: DecisionRows) -> Rows:
+        """The pilot's, or where a guard or another flew what asks for that; clipped to [-1, 1]."""
+        return asked_or_flown(run)
+
+
+def asked_or_flown(run: DecisionRows) -> Rows:
+    """Actions that ask for a velocity and a yaw rate: the pilot's, or if that was not flown what asks for what was."""
+    out = wp.zeros(len(run), dtype=wp.vec4)
+    asked = wp.array(run.action.astype(np.float32), dtype=wp.vec4)
+    flown = wp.array(command_rows_of(run.flown), dtype=Command)
+    wp.launch(navigate_action_rows, len(run), [asked, wp.array(quats(run.yaw), dtype=wp.quat), flown, out])
+    found: Rows = out.numpy()
+    return found
 
 
 def _struct(kind: Any) -> Any:

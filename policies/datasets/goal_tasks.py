@@ -13,12 +13,12 @@ from common.range_sectors import RANGE_M, RANGES
 from common.warp_start import start_warp
 from policies.datasets.decisions import DecisionRows, Rows, TruthRows
 from policies.datasets.episodes import DatasetError
-from policies.datasets.follow_me import command_rows_of, quats, truth_rows
-from policies.datasets.goal_rows import drive_action_rows, drive_rows, navigate_action_rows, navigate_rows
+from policies.datasets.follow_me import asked_or_flown, quats, truth_rows
+from policies.datasets.goal_rows import drive_action_rows, drive_rows, navigate_rows
 from policies.tasks.drive import observe as drive
 from policies.tasks.drive.drive_params import DriveParams
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS
-from policies.tasks.flight.own_state import OWN_ELEMENTS, Command
+from policies.tasks.flight.own_state import OWN_ELEMENTS
 from policies.tasks.layout import Layout
 from policies.tasks.navigate.navigate_params import NavigateParams
 from policies.tasks.task import Task
@@ -67,12 +67,7 @@ class NavigateJudge(_GoalJudge):
 
     def actions(self, run: DecisionRows) -> Rows:
         """The pilot's, or where a guard, the brake before a goal or another flew what asks for that."""
-        out = wp.zeros(len(run), dtype=wp.vec4)
-        asked = wp.array(run.action.astype(np.float32), dtype=wp.vec4)
-        flown = wp.array(command_rows_of(run.flown), dtype=Command)
-        wp.launch(navigate_action_rows, len(run), [asked, wp.array(quats(run.yaw), dtype=wp.quat), flown, out])
-        found: Rows = out.numpy()
-        return found
+        return asked_or_flown(run)
 
     def judged(self, run: DecisionRows, actions: Rows, truth: TruthRows | None) -> tuple[Rows, Rows]:
         height = run.frame[:, _HEIGHT] * OWN_ELEMENTS[_HEIGHT].scale

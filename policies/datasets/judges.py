@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from policies.datasets.decisions import Judge
 from policies.datasets.episodes import DatasetError
-from policies.datasets.follow_me import SETTINGS, FollowMeJudge
+from policies.datasets.follow_me import SETTINGS, FollowMeJudge, ImageFollowMeJudge
 from policies.datasets.goal_tasks import DriveJudge, NavigateJudge
 from policies.tasks.task import Task
 
@@ -30,11 +30,7 @@ def task_pairs(task: str, pairs: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def judge_of(task: Task) -> Judge:
-    """Who judges decisions of a task.
-
-    Raises:
-        DatasetError: it is set so that no flight logs what it shows.
-    """
-    if task.layout.image is not None:
-        raise DatasetError(f"{task.layout.task}: shows images as it is set, and datasets hold them beside only")
+    """Who judges decisions of a task."""
+    if task.layout.image is not None:  # FollowMe alone of them can show one
+        return ImageFollowMeJudge(task)
     return _JUDGES[task.layout.task](task)

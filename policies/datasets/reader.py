@@ -84,23 +84,25 @@ class DatasetReader:
     def __iter__(self) -> Iterator[EpisodeRows]:
         return (self.episode(k) for k in range(self.count))
 
-    def episode(self, k: int) -> EpisodeRows:
-        """An episode, read as a whole.
+    def episode(self, k: int, *, has_images: bool = True) -> EpisodeRows:
+        """An episode, read as a whole, or all of it but its images.
 
         Raises:
             DatasetError: it is damaged, or there is none of this number.
         """
         try:
             group = self._file[f"episode_{k}"]
-            images = group["infos/images"][()] if "infos/images" in group else None
+            names = ("observations/vector", "observations/image")
+            vectors, pixels = names if self.layout.image is not None else ("observations", "infos/images")
+            is_read = has_images and (self.layout.image is not None or pixels in group)
             attributes = dict(group.attrs)
             return EpisodeRows(
-                observations=group["observations"][()],
+                observations=group[vectors][()],
                 actions=group["actions"][()],
                 rewards=group["rewards"][()],
                 is_terminated=bool(group["terminations"][-1]),
                 outcome=str(attributes.get("outcome", "running")),
-                images=images,
+                images=group[pixels][()] if is_read else None,
                 context={n.removeprefix(_CONTEXT): v for n, v in attributes.items() if n.startswith(_CONTEXT)},
             )
         except KeyError as error:

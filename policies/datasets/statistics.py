@@ -79,7 +79,8 @@ def statistics_of(reader: DatasetReader) -> DatasetStatistics:
     observations, actions = _Moments(names), _Moments(acted)
     outcomes: Counter[str] = Counter()
     returns, lengths = [], []
-    for episode in reader:
+    for k in range(reader.count):
+        episode = reader.episode(k, has_images=False)
         observations.add(episode.observations.astype(np.float64))
         actions.add(episode.actions.astype(np.float64).reshape(len(episode), -1))
         outcomes[episode.outcome] += 1

@@ -1,7 +1,8 @@
 """A dataset written episode by episode, in the format of demonstrations (`policies.experts.demonstration_file`).
 
 In: episodes. Out: a Minari folder that appears when it is complete; never more of it in memory than one episode. The
-same episodes give the same bytes. Of images, which Minari has no vector space for, each episode holds `infos/images`.
+same episodes give the same bytes. Where the task shows an image, observations are a group of `vector` and `image`, as
+its Gymnasium environment's are; images that were only kept beside a vector are `infos/images`.
 """
 
 import errno
@@ -9,7 +10,6 @@ import json
 import os
 import shutil
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -20,7 +20,6 @@ from common.files import part_path
 from policies.datasets.episodes import DatasetError, DatasetOrigin, EpisodeRows
 from policies.experts.demonstration_file import LAYOUT_KEY, SETTINGS_KEY, TASK_KEY, check_is_free
 from policies.tasks.gym_arrays import action_space, observation_space
-from policies.tasks.layout import Layout
 
 MAIN_FILE, METADATA_FILE = "main_data.hdf5", "metadata.json"
 CHUNK_ROWS = 1024  # read at once; 55 floats each: 220 KiB
@@ -70,8 +69,12 @@ class DatasetWriter:
             raise DatasetError(
                 f"{self._folder}: an episode of {episode.observations.shape[1]} elements, not {layout.observation_size}"
             )
+        if layout.image is not None and (episode.images is None or episode.images.shape[1:] != layout.image_shape):
+            found = "none" if episode.images is None else episode.images.shape[1:]
+            raise DatasetError(f"{self._folder}: an episode with images of shape {found}, not {layout.image_shape}")
+        images = 0 if episode.images is None else episode.images.nbytes
         try:
-            self._require_space(episode.observations.nbytes + episode.actions.nbytes + 32 * len(episode))
+            self._require_space(episode.observations.nbytes + episode.actions.nbytes + 32 * len(episode) + images)
             self._write(episode)
         except OSError as error:
             raise self._trouble(error) from error
@@ -91,8 +94,9 @@ class DatasetWriter:
         ends[-1] = True
         none = np.zeros(steps, np.bool_)
         actions = episode.actions
+        has_image = self._origin.layout.image is not None
         columns: dict[str, Any] = {
-            "observations": episode.observations.astype(np.float32),
+            "observations/vector" if has_image else "observations": episode.observations.astype(np.float32),
             "actions": actions.astype(np.int64 if self._origin.layout.branches else np.float32),
             "rewards": rewards,
             "terminations": ends if episode.is_terminated else none,
@@ -102,10 +106,9 @@ class DatasetWriter:
             chunk = (min(CHUNK_ROWS, len(column)), *column.shape[1:])
             group.create_dataset(name, data=column, chunks=chunk, maxshape=(None, *column.shape[1:]), track_times=False)
         if episode.images is not None:
-            infos = group.create_group("infos")
-            chunk = (1, *episode.images.shape[1:])
-            infos.create_dataset(
-                "images", data=episode.images, chunks=chunk, compression="gzip", compression_opts=1, track_times=False
+            name, chunk = "observations/image" if has_image else "infos/images", (1, *episode.images.shape[1:])
+            group.create_dataset(
+                name, data=episode.images, chunks=chunk, compression="gzip", compression_opts=1, track_times=False
             )
         group.attrs.update(
             {
@@ -168,7 +171,7 @@ def _metadata(writer: DatasetWriter) -> dict[str, Any]:
         "total_steps": writer.steps,
         "data_format": "hdf5",
         "jpeg_encoding": False,
-        "observation_space": serialize_space(observation_space(vector_layout(layout))),
+        "observation_space": serialize_space(observation_space(layout)),
         "action_space": serialize_space(action_space(layout)),
         "dataset_size": writer.size_mb,
         "dataset_id": f"honeyguide/{layout.task.lower()}/{file_word(origin.pilot)}-v0",
@@ -184,11 +187,6 @@ def _metadata(writer: DatasetWriter) -> dict[str, Any]:
         REWARDS_KEY: origin.rewards_by,
         NOTES_KEY: json.dumps(dict(origin.notes)),
     }
-
-
-def vector_layout(layout: Layout) -> Layout:
-    """The layout without its image: what a dataset's observations are."""
-    return replace(layout, image=None)
 
 
 def file_word(text: str) -> str:

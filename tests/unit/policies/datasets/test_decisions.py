@@ -40,7 +40,8 @@ def decisions(layout, n=12, *, goal=(20.0, 0.0, -2.0), speed=2.0, **columns):
         "is_first": np.zeros(n, np.uint8),
         "is_struck": np.zeros(n, np.bool_),
     }
-    return DecisionRows("run/flight.ulg", layout, "somebody", **(made | columns))
+    made |= columns
+    return DecisionRows("run/flight.ulg", layout, "somebody", **({"seen": made["frame"]} | made))
 
 
 @pytest.fixture(scope="module")
