@@ -21,7 +21,7 @@ def collect_dataset(options: CollectOptions, console: Console) -> None:
 
     Raises:
         UnknownTask, NoExpert, PlayError, LayoutError: the task, its settings or the policy cannot be used.
-        DatasetError: the task shows images, shards are given numbers, or the dataset cannot be written.
+        DatasetError: shards are given numbers, or the dataset cannot be written.
         DemonstrationFileError: the same.
     """
     check_is_free(options.out)

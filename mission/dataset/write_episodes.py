@@ -6,9 +6,9 @@ from pathlib import Path
 
 from mission.train.play import PlayOptions, cast
 from policies.datasets.collecting import NoisyDriver, collected
-from policies.datasets.episodes import NUMBER_NOTE, DatasetError, DatasetOrigin
+from policies.datasets.episodes import NUMBER_NOTE, DatasetOrigin
 from policies.datasets.writer import DatasetWriter
-from policies.experts.episode_recording import MAX_ROWS
+from policies.experts.episode_recording import IMAGE_ROWS_MAX, MAX_ROWS
 from policies.tasks.catalogue import settings_of
 
 EXPERT, RANDOM = "expert", "random"
@@ -38,24 +38,13 @@ def write_episodes(options: CollectOptions, note: Callable[[int], None] = lambda
     Raises:
         UnknownTask, NoExpert, PlayError, LayoutError: the task, its settings or the policy cannot be used.
         NumberError: a number that the task has not.
-        DatasetError: the task shows images, or the dataset cannot be written.
+        DatasetError: the dataset cannot be written.
         DemonstrationFileError: the same.
     """
     is_named = options.policy not in (EXPERT, RANDOM)
-    played = PlayOptions(
-        options.task,
-        options.episodes,
-        min(options.episodes, MAX_ROWS),
-        options.seed,
-        options.env_args,
-        options.policy if is_named else None,
-        options.policy == RANDOM,
-        options.policy == EXPERT,
-        None,
-    )
-    task, driver, name = cast(played)
-    if task.layout.image is not None:
-        raise DatasetError(f"{task.layout.task}: shows images as it is set, and datasets of episodes hold none")
+    task, driver, name = cast(_played(options, IMAGE_ROWS_MAX))
+    if task.layout.image is None and options.episodes > IMAGE_ROWS_MAX:
+        task, driver, name = cast(_played(options, MAX_ROWS))
     task.set_params(options.numbers)
     notes = {f"{NUMBER_NOTE}{name}": drawn for name, drawn in task.param_table.changed().items()}
     settings = getattr(task, "settings", None) or settings_of(options.task, options.env_args)
@@ -64,3 +53,18 @@ def write_episodes(options: CollectOptions, note: Callable[[int], None] = lambda
     noisy = NoisyDriver(driver, options.noise, options.seed)
     with DatasetWriter(options.out, origin) as writer:
         writer.add_all(collected(task, noisy, options.episodes, options.seed, note))
+
+
+def _played(options: CollectOptions, rows_max: int) -> PlayOptions:
+    """Who drives what, so many rows side by side at most."""
+    return PlayOptions(
+        options.task,
+        options.episodes,
+        min(options.episodes, rows_max),
+        options.seed,
+        options.env_args,
+        options.policy if options.policy not in (EXPERT, RANDOM) else None,
+        options.policy == RANDOM,
+        options.policy == EXPERT,
+        None,
+    )

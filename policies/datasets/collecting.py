@@ -87,4 +87,5 @@ def rows_of(episode: Episode, layout: Layout) -> EpisodeRows:
         rewards=episode.rewards,
         is_terminated=not episode.is_truncated,
         outcome=episode.outcome.name.lower(),
+        images=episode.images,
     )

@@ -32,6 +32,7 @@ def export_d4rl(source: Path, target: Path) -> int:
     part = part_path(target)
     try:
         with DatasetReader(source) as reader, h5py.File(part, "w") as file:
+            _refuse_images(reader)
             columns: dict[str, Any] = {}
             for episode in reader:
                 for name, rows in _d4rl_columns(episode).items():
@@ -89,6 +90,7 @@ def export_lerobot(source: Path, target: Path) -> int:
         (part / "meta").mkdir(parents=True)
         lengths, first = [], 0
         with DatasetReader(source) as reader:
+            _refuse_images(reader)
             fps = _HOVER_HZ if reader.layout.task == "Hover" else _DECISION_HZ
             for k, episode in enumerate(reader):
                 folder = part / "data" / f"chunk-{k // _EPISODES_PER_CHUNK:03d}"
@@ -153,6 +155,11 @@ def _write_meta(folder: Path, reader: DatasetReader, lengths: list[int], fps: in
     lines = [json.dumps({"episode_index": k, "tasks": [layout.task], "length": n}) for k, n in enumerate(lengths)]
     (folder / "episodes.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
     (folder / "tasks.jsonl").write_text(json.dumps({"task_index": 0, "task": layout.task}) + "\n", encoding="utf-8")
+
+
+def _refuse_images(reader: DatasetReader) -> None:
+    if reader.layout.image is not None:
+        raise DatasetError(f"{reader.folder}: observations with images are not exported: vectors alone are")
 
 
 def _check_is_free(target: Path) -> None:

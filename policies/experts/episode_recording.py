@@ -15,6 +15,7 @@ from policies.tasks.episode import Outcome
 from policies.tasks.task import Task
 
 MAX_ROWS = 256  # guess: enough to fill a launch; more would only lengthen the wait for each row's last episode
+IMAGE_ROWS_MAX = 16  # of a task that shows images: FollowMe's 600 decisions of 16 KiB are 160 MB of that many
 _PATIENCE = 20  # episodes tried per episode asked for before an expert is called unfit
 
 
@@ -32,6 +33,7 @@ class Episode:
     rewards: NDArray[np.float64]  # (steps,)
     outcome: Outcome
     is_truncated: bool  # cut by its step limit; a task may call that a success
+    images: NDArray[np.uint8] | None = None  # (steps + 1, height, width, channels), of a task that shows them
 
     @property
     def is_success(self) -> bool:
@@ -44,6 +46,7 @@ class _Row:
     continuous: list[Any] = field(default_factory=list)
     branches: list[Any] = field(default_factory=list)
     rewards: list[Any] = field(default_factory=list)
+    images: list[Any] = field(default_factory=list)
 
 
 class Recorder:
@@ -59,7 +62,10 @@ class Recorder:
         seen, pushed, chosen = (
             array.numpy().copy() for array in (buffers.observations, buffers.continuous, buffers.branches)
         )
+        images = buffers.images.numpy() if self._task.layout.image is not None else None
         for i, row in enumerate(self._rows):
+            if images is not None:
+                row.images.append(images[i].copy())  # a view would keep those of all rows
             row.observations.append(seen[i])
             row.continuous.append(pushed[i])
             row.branches.append(chosen[i])
@@ -79,14 +85,17 @@ class Recorder:
     def _taken(self, i: int, outcome: Outcome) -> Episode:
         row = self._rows[i]
         self.drop(i)
-        final = self._task.buffers.final_observations.numpy()[i]
+        buffers = self._task.buffers
+        final = buffers.final_observations.numpy()[i]
+        images = np.stack([*row.images, buffers.final_images.numpy()[i]]) if row.images else None
         return Episode(
             observations=np.stack([*row.observations, final]).astype(np.float32),
             continuous=np.stack(row.continuous).astype(np.float32),
             branches=np.stack(row.branches).astype(np.int64),
             rewards=np.array(row.rewards, dtype=np.float64),
             outcome=outcome,
-            is_truncated=bool(self._task.buffers.is_truncated.numpy()[i]),
+            is_truncated=bool(buffers.is_truncated.numpy()[i]),
+            images=images,
         )
 
 

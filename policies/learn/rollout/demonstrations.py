@@ -138,6 +138,8 @@ def _read_dataset(folder: Path, layout: Layout) -> list[_Episode]:
     from minari.dataset.minari_storage import MinariStorage  # noqa: PLC0415  (only who has demonstrations pays for it)
 
     layout.require(recorded_layout(folder), str(folder))
+    if layout.image is not None:
+        raise DemonstrationError(f"{folder}: holds images, and demonstrations are read without")
     try:
         storage = MinariStorage.read(folder)
         count = int(storage.total_episodes)

@@ -7,6 +7,7 @@ from minari import MinariDataset
 
 from policies.datasets.editing import keep, merge, split
 from policies.datasets.episodes import DatasetError, DatasetOrigin, EpisodeRows
+from policies.datasets.exporting import export_d4rl
 from policies.datasets.reader import DatasetReader
 from policies.datasets.statistics import statistics_of
 from policies.datasets.writer import DatasetWriter
@@ -111,3 +112,10 @@ def test_an_episode_with_an_image_too_few_is_refused():
     whole = episode()
     with pytest.raises(DatasetError, match="an episode of 6 observations has 5 images"):
         EpisodeRows(whole.observations, whole.actions, whole.rewards, True, "lost", whole.images[:-1])
+
+
+def test_observations_with_images_are_not_exported(tmp_path):
+    folder = written(tmp_path / "set")
+    with pytest.raises(DatasetError, match="set: observations with images are not exported"):
+        export_d4rl(folder, tmp_path / "out.hdf5")
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
