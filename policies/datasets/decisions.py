@@ -54,6 +54,14 @@ class DecisionRows:
         return len(self.time_us)
 
 
+def struck_on_the_way(run: DecisionRows) -> Rows:
+    """Whether something was struck on the way to each row, which after the last is the last's; 1 or 0, shape (n,)."""
+    struck = np.zeros(len(run), np.int32)
+    struck[1:] = run.is_struck[:-1]
+    struck[-1] |= int(run.is_struck[-1])
+    return struck
+
+
 COLUMNS = (
     "time_us", "frame", "seen", "action", "flown", "pos_ned", "vel_ned", "goal", "yaw", "i_image", "is_flying",
     "is_first", "is_struck",

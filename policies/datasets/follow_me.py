@@ -1,7 +1,7 @@
 """Logged flights of a follower as episodes of FollowMe: of its tracked setting, or of that with images.
 
 In: decisions, and the truth where the log has it. Out: rewards and ends by the task's own functions, on the truth, or
-else on what the senses knew, which is in the frames of all followers' logs.
+else on what the senses knew, which is in the frames of all followers' logs; what it struck by its accelerometers.
 """
 
 from typing import Any
@@ -11,7 +11,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.warp_start import start_warp
-from policies.datasets.decisions import DecisionRows, Rows, TruthRows
+from policies.datasets.decisions import DecisionRows, Rows, TruthRows, struck_on_the_way
 from policies.datasets.follow_me_rows import action_rows, follow_rows, sight_rows
 from policies.datasets.goal_rows import navigate_action_rows
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS
@@ -64,7 +64,9 @@ class FollowMeJudge:
         steps = len(run) - 1
         has_owner = truth is not None and truth.owner is not None
         sights = self._true_sights(truth) if truth is not None and has_owner else self._known_sights(run)
-        touched = truth.is_on_ground.astype(np.int32) if truth is not None else np.zeros(len(run), np.int32)
+        touched = struck_on_the_way(run)
+        if truth is not None:
+            touched |= truth.is_on_ground.astype(np.int32)
         rewards, outcomes = wp.zeros(steps, dtype=float), wp.zeros(steps, dtype=int)
         unseen_s = self._unseen_s(sights["is_in_view"])
         params = typed_rows(self._params, FollowParams, first=len(FLIGHT_PARAMS))

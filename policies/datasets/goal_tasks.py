@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from common.range_sectors import RANGE_M, RANGES
 from common.warp_start import start_warp
-from policies.datasets.decisions import DecisionRows, Rows, TruthRows
+from policies.datasets.decisions import DecisionRows, Rows, TruthRows, struck_on_the_way
 from policies.datasets.episodes import DatasetError
 from policies.datasets.follow_me import asked_or_flown, quats, truth_rows
 from policies.datasets.goal_rows import drive_action_rows, drive_rows, navigate_rows
@@ -36,13 +36,6 @@ class _GoalJudge:
         self.layout: Layout = task.layout
         self._step_s = task.decision_s
         self._params = wp.array(task.param_table.typical(), dtype=float)
-
-    def _touched(self, run: DecisionRows) -> Rows:
-        """Whether something was struck on the way to each row, which after the last is the last's, shape (n,)."""
-        touched = np.zeros(len(run), np.int32)
-        touched[1:] = run.is_struck[:-1]
-        touched[-1] |= int(run.is_struck[-1])
-        return touched
 
     def _where(self, run: DecisionRows, truth: TruthRows | None, height_m: Rows) -> Rows:
         """Rows of `Truth`: the truth, or the estimate in its place.
@@ -75,7 +68,7 @@ class NavigateJudge(_GoalJudge):
         ranges_m = (1.0 - run.frame[:, -RANGES:]) * RANGE_M
         rooms = np.minimum(ranges_m.min(axis=1), _ROOM_MAX_M)
         drives = self.layout.task == "NavigateRover"
-        touched = self._touched(run)
+        touched = struck_on_the_way(run)
         if not drives:
             touched |= where["is_on_ground"]
         steps = len(run) - 1
@@ -124,7 +117,7 @@ class DriveJudge(_GoalJudge):
             wp.array(_floats(np.hypot(off[:, 0], off[:, 1])), dtype=float),
             wp.array(_floats(turns), dtype=float),
             wp.array(_floats(rooms), dtype=float),
-            wp.array(self._touched(run), dtype=int),
+            wp.array(struck_on_the_way(run), dtype=int),
             wp.array(_floats(actions[:steps]), dtype=wp.vec2),
         ]
         wp.launch(drive_rows, steps, [*inputs, rewards, outcomes])

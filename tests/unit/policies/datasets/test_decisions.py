@@ -11,6 +11,7 @@ from policies.datasets.follow_me import FollowMeJudge, command_rows_of, quats
 from policies.datasets.follow_me_rows import action_rows
 from policies.datasets.goal_tasks import DriveJudge, NavigateJudge
 from policies.datasets.hover import HoverBuilder, HoverLog
+from policies.datasets.judges import judge_of
 from policies.tasks.catalogue import build_task, settings_of
 from policies.tasks.flight.own_state import Command, OwnState
 from policies.tasks.follow_me.tracked.vector import next_command_rows
@@ -211,6 +212,30 @@ def test_a_follower_that_loses_its_owner_ends():
     episode = next(iter(episodes_of(rows, judge, None)))
     assert episode.outcome == "lost"
     assert episode.rewards[:18].min() > episode.rewards[-1]
+
+
+@pytest.mark.parametrize("pairs", [("observation=tracked",), ("observation=camera",)])
+def test_a_follower_that_struck_something_collided(pairs):
+    judge = judge_of(task_of("FollowMe", *pairs))
+    names = [element.name for element in RECORD_LAYOUT.frame]
+    struck = np.zeros(12, np.bool_)
+    struck[6] = True
+    rows = decisions(RECORD_LAYOUT, is_struck=struck)
+    for name, value in {"is_owner_seen": 1.0, "seen_distance": 2.0 / 3.0, "seen_owner_pos_hfrd_x": 2.0 / 3.0}.items():
+        rows.frame[:, names.index(name)] = value
+    episode = next(iter(episodes_of(rows, judge, None)))
+    assert (episode.outcome, episode.is_terminated, len(episode)) == ("hit_obstacle", True, 7)
+    assert episode.rewards[-1] < episode.rewards[:-1].min() - 1.0
+
+
+def test_actions_of_who_looks_at_images_ask_for_what_was_flown():
+    judge = judge_of(task_of("FollowMe", "observation=camera"))
+    asked = np.full((12, 4), np.nan, np.float32)
+    asked[:6] = 2.0 / 7.0, 0.0, 0.0, 0.0  # of 7 m/s: it flies at 2
+    asked[6:9] = 1.0, 0.0, 0.0, 0.0  # what a guard did not let pass; the rest another flew
+    actions = judge.actions(decisions(RECORD_LAYOUT, action=asked))
+    assert np.array_equal(actions[:6], asked[:6])
+    assert np.allclose(actions, [2.0 / 7.0, 0.0, 0.0, 0.0])
 
 
 def test_hover_is_paid_for_staying():
