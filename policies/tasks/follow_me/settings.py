@@ -1,5 +1,6 @@
 """FollowMe's settings: the preset, and the choices it makes, each of which can be made by itself."""
 
+from pathlib import Path
 from typing import ClassVar, Literal
 
 from pydantic import Field, field_validator
@@ -39,12 +40,12 @@ class FollowSettings(RigSettings):
     @property
     def airframes(self) -> tuple[str, ...]:
         """The names in `airframe`."""
-        return tuple(self.airframe.split("+"))
+        return _airframes(self.airframe)
 
     @field_validator("airframe")
     @classmethod
     def _hovers(cls, airframe: str) -> str:
-        for name in airframe.split("+"):
+        for name in _airframes(airframe):
             try:
                 body = class_of(load_airframe(name)).body
             except AirframeError as error:
@@ -52,3 +53,18 @@ class FollowSettings(RigSettings):
             if body is not DEFAULT_BODY:
                 raise ValueError(f"{name} cannot hover")
         return airframe
+
+
+def _airframes(text: str) -> tuple[str, ...]:
+    """The names and files that stand in a text with + between them; a file's own path may hold some."""
+    parts, found = text.split("+"), list[str]()
+    while parts:
+        sizes = (k for k in range(1, len(parts) + 1) if _is_file("+".join(parts[:k])))
+        size = next(sizes, 1)
+        found.append("+".join(parts[:size]))
+        parts = parts[size:]
+    return tuple(found)
+
+
+def _is_file(path: str) -> bool:
+    return path.endswith(".toml") and Path(path).is_file()
