@@ -1,15 +1,18 @@
 """Datasets in the formats of others: D4RL's flat HDF5, and LeRobot's parquet folder.
 
 An episode passes at a time. D4RL (Fu et al. 2020): columns of all steps in a row, `terminals` and `timeouts` marking
-the ends, `next_observations` beside them. LeRobot 2.1: a parquet file per episode and JSON beside (meta/info.json).
+the ends, `next_observations` beside them. LeRobot 2.1: a parquet file per episode, and in `meta` info.json and a line
+per episode of episodes.jsonl and episodes_stats.jsonl, without which its reader opens nothing.
 """
 
 import json
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.files import part_path
 from policies.datasets.episodes import DatasetError, EpisodeRows
@@ -80,8 +83,7 @@ def export_lerobot(source: Path, target: Path) -> int:
         DatasetError: the dataset cannot be read, or the folder not be written.
         ModuleNotFoundError: pyarrow is not installed.
     """
-    import pyarrow as pa  # noqa: PLC0415  (extra `lerobot`)
-    from pyarrow import parquet  # noqa: PLC0415
+    from pyarrow import parquet  # noqa: PLC0415  (extra `lerobot`)
 
     _check_is_free(target)
     part = part_path(target)
@@ -95,8 +97,10 @@ def export_lerobot(source: Path, target: Path) -> int:
             for k, episode in enumerate(reader):
                 folder = part / "data" / f"chunk-{k // _EPISODES_PER_CHUNK:03d}"
                 folder.mkdir(parents=True, exist_ok=True)
-                table = pa.table(_lerobot_columns(episode, k, first, fps))
-                parquet.write_table(table, folder / f"episode_{k:06d}.parquet")
+                columns = _lerobot_columns(episode, k, first, fps)
+                parquet.write_table(_arrow_table(columns), folder / f"episode_{k:06d}.parquet")
+                found = {"episode_index": k, "stats": _statistics(columns)}
+                _append_line(part / "meta" / "episodes_stats.jsonl", found)
                 lengths.append(len(episode))
                 first += len(episode)
             _write_meta(part / "meta", reader, lengths, fps)
@@ -108,12 +112,15 @@ def export_lerobot(source: Path, target: Path) -> int:
     return first
 
 
-def _lerobot_columns(episode: EpisodeRows, k: int, first: int, fps: int) -> dict[str, Any]:
+def _lerobot_columns(episode: EpisodeRows, k: int, first: int, fps: int) -> dict[str, NDArray[Any]]:
+    """Shape (steps,), or (steps, elements) of what has more than one, as LeRobot's features have them."""
     steps = len(episode)
-    actions = episode.actions.reshape(steps, -1).astype(np.float32)
+    vectors = {
+        "observation.state": episode.observations[:-1].astype(np.float32),
+        "action": episode.actions.reshape(steps, -1).astype(np.float32),
+    }
     return {
-        "observation.state": list(episode.observations[:-1].astype(np.float32)),
-        "action": list(actions),
+        **{name: rows[:, 0] if rows.shape[1] == 1 else rows for name, rows in vectors.items()},
         "next.reward": episode.rewards.astype(np.float32),
         "next.done": np.arange(steps) == steps - 1,
         "next.success": (np.arange(steps) == steps - 1) & episode.is_success,
@@ -123,6 +130,31 @@ def _lerobot_columns(episode: EpisodeRows, k: int, first: int, fps: int) -> dict
         "index": np.arange(first, first + steps, dtype=np.int64),
         "task_index": np.zeros(steps, np.int64),
     }
+
+
+def _arrow_table(columns: Mapping[str, NDArray[Any]]) -> Any:
+    import pyarrow as pa  # noqa: PLC0415  (extra `lerobot`)
+
+    arrays = {
+        name: pa.array(rows) if rows.ndim == 1 else pa.FixedSizeListArray.from_arrays(rows.ravel(), rows.shape[1])
+        for name, rows in columns.items()
+    }
+    return pa.table(arrays)
+
+
+def _statistics(columns: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, Any]]:
+    """Of each column of an episode: least, most, mean and deviation of each element, and how many rows."""
+    found: dict[str, dict[str, Any]] = {}
+    for name, column in columns.items():
+        rows = column.reshape(len(column), -1)
+        moments = {"min": rows.min(0), "max": rows.max(0), "mean": rows.mean(0), "std": rows.std(0)}
+        found[name] = {key: value.tolist() for key, value in moments.items()} | {"count": [len(rows)]}
+    return found
+
+
+def _append_line(path: Path, record: Mapping[str, Any]) -> None:
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(record) + "\n")
 
 
 def _write_meta(folder: Path, reader: DatasetReader, lengths: list[int], fps: int) -> None:
