@@ -60,7 +60,15 @@ def test_the_same_log_gives_the_same_bytes_and_is_shown(run, tmp_path):
     assert film.stat().st_size > 1_000
 
 
-def test_a_policy_that_is_cloned_from_it_flies(run, tmp_path):
+@pytest.mark.parametrize(
+    "memory",
+    [
+        {"memory_size": 16, "sequence_length": 8},
+        {"memory_type": "transformer", "sequence_length": 8, "layers": 1, "heads": 2},
+    ],
+    ids=["lstm", "transformer"],
+)
+def test_a_policy_that_is_cloned_from_it_acts_as_a_pilot(run, tmp_path, memory):
     folder, _ = run
     assert built(folder, tmp_path / "set", *CAMERA).exit_code == 0
     recipe = {
@@ -73,7 +81,7 @@ def test_a_policy_that_is_cloned_from_it_flies(run, tmp_path):
                     "normalize": True,
                     "hidden_units": 16,
                     "num_layers": 1,
-                    "memory": {"memory_size": 16, "sequence_length": 8},
+                    "memory": memory,
                 },
                 "max_steps": 20,
             }
@@ -87,9 +95,10 @@ def test_a_policy_that_is_cloned_from_it_flies(run, tmp_path):
     pilot = load_pilot(str(tmp_path / "bc"))
     with DatasetReader(tmp_path / "set") as reader:
         episode = reader.episode(0)
-    action = pilot.act(episode.observations[0], episode.images[0])
-    assert action.shape == (4,)
-    assert (abs(action) <= 1.0).all()
+    for vector, image in zip(episode.observations[:10], episode.images[:10], strict=True):
+        action = pilot.act(vector, image)
+        assert action.shape == (4,)
+        assert (abs(action) <= 1.0).all()
 
 
 def test_a_log_without_images_is_refused_with_file_and_topic(run, tmp_path):
