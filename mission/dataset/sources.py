@@ -78,7 +78,7 @@ class FlightSource:
         if not archive.is_file():
             raise DatasetError(f"{self.path}: {TOPIC}: was recorded without pictures: {archive.name} is missing")
         if (numbers < 0).any():
-            raise DatasetError(f"{self.path}: {TOPIC}: {int((numbers < 0).sum())} decisions in a row have no picture")
+            raise DatasetError(f"{self.path}: {TOPIC}: {int((numbers < 0).sum())} decisions have no picture")
         try:
             with zipfile.ZipFile(archive) as file:
                 return np.stack([read_image(file, int(number)) for number in numbers])

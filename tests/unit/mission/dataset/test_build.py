@@ -8,10 +8,12 @@ from typer.testing import CliRunner
 
 from common.logs.ulog import UlogWriter
 from mission.cli import app
-from mission.dataset.sources import struck
+from mission.dataset.companion_log import IMAGES_FILE, ImageFile
+from mission.dataset.sources import FlightSource, struck
 from mission.log.ulog_file import is_whole
 from policies.companion.decision_log import TOPIC, topic_fields, topic_info
 from policies.companion.vector_pilot import NavigationPilot
+from policies.datasets.episodes import DatasetError
 from policies.datasets.reader import DatasetReader
 
 LAYOUT = NavigationPilot.task
@@ -101,3 +103,20 @@ def test_a_log_is_whole_up_to_the_end_of_a_message(tmp_path):
     assert (found[0], found[-1], sum(found)) == (False, True, 1)
     path.write_bytes(content + b"\x05\x00~12345")  # a message of a kind that there is not
     assert not is_whole(path)
+
+
+def test_images_are_read_as_they_were_kept_or_refused_with_file_and_topic(tmp_path):
+    log = tmp_path / "flight.ulg"
+    source = FlightSource(log, None, None)
+    with pytest.raises(DatasetError, match=f"{log}: {TOPIC}: was recorded without pictures: images.zip is missing"):
+        source.images(np.array([0]))
+    shown = np.random.default_rng(0).integers(0, 256, (2, 8, 8, 4), np.uint8)
+    kept = ImageFile(tmp_path / IMAGES_FILE, pytest.fail)
+    first, second = shown
+    assert [kept.add(image) for image in (first, first, second)] == [0, 0, 1]
+    kept.close()
+    assert np.array_equal(source.images(np.array([0, 0, 1])), shown[[0, 0, 1]])
+    with pytest.raises(DatasetError, match=f"{log}: {TOPIC}: 1 decisions have no picture"):
+        source.images(np.array([0, -1]))
+    with pytest.raises(DatasetError, match=f"{log}: {TOPIC}: a picture in images.zip is missing or damaged"):
+        source.images(np.array([0, 2]))
