@@ -148,7 +148,6 @@ STORIES = {
         is_hit=lambda drive: bool(drive["outcome"] == "touched"),
         judge=_judge_parking,
         inverse_temperature=0.3,  # twenty are paid for arriving
-        keeps_best=True,
         page="offline-parking",
         titles=("drives", "policy that ships"),
     ),
