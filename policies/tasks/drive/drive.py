@@ -18,6 +18,7 @@ from policies.tasks.drive.drive_top_view import draw
 from policies.tasks.drive.observe import ACTIONS, FRAME, LAYOUT_VERSION, SECTORS, STACK
 from policies.tasks.drive.settings import DriveSettings
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
+from policies.tasks.flight.reported import KEPT_SCANS
 from policies.tasks.flight.standing_bank import standing_bank
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
 from policies.tasks.layout import Layout
@@ -102,7 +103,9 @@ class Drive(FlightTask):
         state.outs = self._zeros("outs", n, float)
         state.left_m = self._zeros("left_m", n, float)
         state.start_left_m = self._zeros("start_left_m", n, float)
+        state.attitude_errors = self._zeros("attitude_errors", n, wp.quat)
         state.ranges_m = self._zeros("ranges_m", (n, SECTORS), float)
+        state.scans_m = self._zeros("scans_m", (n, KEPT_SCANS, SECTORS), float)
         state.measures = self._zeros("measures", (n, len(MEASURES)), float)
         return state
 

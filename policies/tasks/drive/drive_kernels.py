@@ -19,7 +19,8 @@ from policies.tasks.episode import StepBuffers, close_step, open_frame
 from policies.tasks.flight.driven_vehicle import RoverArrays, vary_rover
 from policies.tasks.flight.episode_start import Start, ask_for_world, begin_flight
 from policies.tasks.flight.flight_params import FlightParams
-from policies.tasks.flight.flown_vehicle import free_setpoint, vehicle_estimate
+from policies.tasks.flight.flown_vehicle import free_setpoint
+from policies.tasks.flight.reported import attitude_error, reported_estimate, show_late
 from sim.sensors.ground_ring import ring_ranges
 from sim.truth import Truth
 from sim.world.world import World, obstacle_contact, world_at
@@ -29,6 +30,7 @@ wp.set_module_options({"enable_backward": False})
 _HALF_WIDTH_M = wp.constant(0.22)  # of the hull
 _END_M = wp.constant(0.15)  # from its middle to those of the circles at its ends
 _ROOM_MAX_M = wp.constant(1.0)
+_ERROR_STREAM = wp.constant(41)
 
 MEASURES = ("distance_m", "heading_error_rad", "speed_m_s", "room_m", "way_left_m", "time_s", "start_way_m")
 """After each decision, the simulator's truth: distance and heading from the goal's, speed, room round the hull (at most
@@ -55,7 +57,9 @@ class DriveState:
     outs: wp.array(dtype=float)  # of goals: see `way_left_m`
     left_m: wp.array(dtype=float)  # of the way, at the last decision
     start_left_m: wp.array(dtype=float)
-    ranges_m: wp.array2d(dtype=float)  # (envs, SECTORS)
+    attitude_errors: wp.array(dtype=wp.quat)  # of the attitude that is told
+    ranges_m: wp.array2d(dtype=float)  # (envs, SECTORS) as they are shown
+    scans_m: wp.array3d(dtype=float)  # (envs, KEPT_SCANS, SECTORS) as they were measured, newest first
     measures: wp.array2d(dtype=float)  # (envs, MEASURES)
 
 
@@ -98,14 +102,17 @@ def room_round(world: World, truth: Truth) -> float:
 
 
 @wp.func
-def show_frame(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: DriveState, i: int) -> None:
-    """The newest frame of the observation."""
+def show_frame(
+    buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: DriveState, is_first: int, i: int
+) -> None:
+    """The newest frame of the observation; `is_first` as an episode begins."""
     truth = rig.truth[i]
     tick = draw_tick(rig.tick[i])
     place = wp.vec2(truth.pos_ned[0], truth.pos_ned[1])
     heading = yaw_from_quat(truth.q_ned_from_frd)
     ring_ranges(world_now(rig, i), place, heading, state.params[i].range_noise, rig.seed[i], tick, state.ranges_m, i)
-    own = own_drive(vehicle_estimate(rig, i, rules.has_estimator))
+    show_late(state.params[i].scan_lag_s, is_first, state.scans_m, state.ranges_m, i)
+    own = own_drive(reported_estimate(rig, i, rules.has_estimator, state.attitude_errors))
     at = open_frame(buffers, i)
     write_frame(own, state.actions[i], state.goals[i], state.ranges_m, buffers.observations, i, at)
 
@@ -143,7 +150,7 @@ def judge(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: Driv
     state.measures[i, 4] = left_m
     state.measures[i, 5] = time_s
     state.measures[i, 6] = state.start_left_m[i]
-    show_frame(buffers, rules, rig, state, i)
+    show_frame(buffers, rules, rig, state, 0, i)
     start.is_starting[i] = close_step(buffers, i, reward, outcome)
 
 
@@ -185,4 +192,5 @@ def place(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: Driv
     left_m = way_left_m(true_pose(rig.truth[i]), goal, out)
     state.left_m[i] = left_m
     state.start_left_m[i] = left_m
-    show_frame(buffers, rules, rig, state, i)
+    state.attitude_errors[i] = attitude_error(params.attitude_error_deg, seed, i, episode, _ERROR_STREAM)
+    show_frame(buffers, rules, rig, state, 1, i)

@@ -3,6 +3,7 @@
 import warp as wp
 
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS
+from policies.tasks.flight.reported import REPORT_PARAMS
 from policies.tasks.task_params import Sampler, TaskParam
 
 
@@ -33,6 +34,8 @@ class DriveParams:
     clearance_cost: float
     jerk_cost: float
     hit_cost: float
+    scan_lag_s: float
+    attitude_error_deg: float
 
 
 DRIVE_PARAMS = (
@@ -59,6 +62,7 @@ DRIVE_PARAMS = (
     TaskParam("clearance_cost", 0.1, 0.0, 10.0, "1", "per decision for no room at all", "tuned"),
     TaskParam("jerk_cost", 0.002, 0.0, 10.0, "1", "per decision for the squared change of the action", "tuned"),
     TaskParam("hit_cost", 5.0, 0.0, 1000.0, "1", "of touching anything or tipping over, which ends it", "tuned"),
+    *REPORT_PARAMS,
 )
 PARAMS = (*FLIGHT_PARAMS, *DRIVE_PARAMS)
 

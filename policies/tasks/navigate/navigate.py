@@ -16,6 +16,7 @@ from common.kernels import TICK_S
 from common.range_sectors import RANGES
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
 from policies.tasks.flight.own_state import ACTIONS, Command
+from policies.tasks.flight.reported import KEPT_SCANS
 from policies.tasks.flight.standing_bank import standing_bank
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
 from policies.tasks.layout import ImageElement, Layout
@@ -34,7 +35,7 @@ from policies.tasks.navigate.navigate_kernels import (
 from policies.tasks.navigate.navigate_params import IMPROVED, PARAMS, ROVER, ROVER_PARAMS, NavigateParams
 from policies.tasks.navigate.navigate_top_view import draw
 from policies.tasks.navigate.observe import DEPTH_CHANNELS, LAYOUT_VERSION, RAY_STACK, frame_elements
-from policies.tasks.navigate.scan import KEPT_SCANS, scan
+from policies.tasks.navigate.scan import scan
 from policies.tasks.navigate.settings import NavigateSettings
 from policies.tasks.task_params import Sampler, TaskParam, typed_rows
 from sim.sensors.sensors import sensor_model

@@ -18,10 +18,11 @@ from policies.tasks.flight.episode_start import Start, ask_for_world, begin_flig
 from policies.tasks.flight.flight_params import FlightParams
 from policies.tasks.flight.flown_vehicle import velocity_setpoint
 from policies.tasks.flight.own_state import Command, action_command
+from policies.tasks.flight.reported import attitude_error, reported_estimate
 from policies.tasks.navigate.navigate_params import NavigateParams
 from policies.tasks.navigate.observe import write_frame
 from policies.tasks.navigate.reward import navigate_outcome, navigate_reward
-from policies.tasks.navigate.vehicles import attitude_error, goal_shown, own, reported_estimate, touches, vary
+from policies.tasks.navigate.vehicles import goal_shown, own, touches, vary
 from policies.tasks.navigate.walking_goal import follow_speed, walk_vel
 from sim.truth import Truth
 from sim.world.world import World, ground_height, obstacle_contact
@@ -32,6 +33,7 @@ _ROOM_MAX_M = wp.constant(2.0)  # the largest radius that contact is asked with
 _EDGE_M = wp.constant(5.0)  # a goal walks no nearer to the edge of the map
 _BEARING_STREAM = wp.constant(6)
 _DISTANCE_STREAM = wp.constant(7)
+_ERROR_STREAM = wp.constant(10)
 
 MEASURES = ("distance_m", "speed_m_s", "room_m", "path_m", "time_s", "start_distance_m")
 """After each decision, the simulator's truth: distance to the goal, speed, room to trunks and crowns (at most 2 m), the
@@ -166,7 +168,7 @@ def place(buffers: StepBuffers, rig: Any, state: NavigateState, start: Start) ->
     episode = buffers.episodes[i] - 1
     params = state.params[i]
     vary(rig, start.makes, state.flight[i], seed, i, episode)
-    state.attitude_errors[i] = attitude_error(params.attitude_error_deg, seed, i, episode)
+    state.attitude_errors[i] = attitude_error(params.attitude_error_deg, seed, i, episode, _ERROR_STREAM)
     pos_ned = rig.truth[i].pos_ned
     bearing = draw_angle(seed, i, episode, _BEARING_STREAM)
     fraction = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5

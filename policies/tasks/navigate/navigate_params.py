@@ -8,6 +8,7 @@ from dataclasses import replace
 import warp as wp
 
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS
+from policies.tasks.flight.reported import REPORT_PARAMS
 from policies.tasks.navigate.observe import GOAL_MAX_M, ROVER_GOAL_MAX_M
 from policies.tasks.task_params import Sampler, TaskParam
 from sim.world.forest_world import TREES_PER_HA_MAX
@@ -75,16 +76,7 @@ NAVIGATE_PARAMS = (
     TaskParam("turn_cost", 0.001, 0.0, 10.0, "1", "per decision for the squared yaw rate asked for", "tuned"),
     TaskParam("kept_m", 0.0, -10.0, 10.0, "m", "above 0 the goal walks, and is followed so far behind", "ours"),
     TaskParam("walk_m_s", 1.8, 0.0, 5.0, "m/s", "how fast it walks at most", "guess"),
-    TaskParam("scan_lag_s", 0.0, 0.0, 0.3, "s", "age of the ranges that are shown, in steps of 0.1 s", "guess"),
-    TaskParam(
-        "attitude_error_deg",
-        0.0,
-        0.0,
-        10.0,
-        "deg",
-        "of the attitude that is told, about an axis drawn per episode",
-        "guess",
-    ),
+    *REPORT_PARAMS,
 )
 PARAMS = (*FLIGHT_PARAMS, *NAVIGATE_PARAMS)
 ROVER_GOALS_M = {"goal_min_m": 30.0, "goal_max_m": ROVER_GOAL_MAX_M}  # trees and walls stand up to 51 m from home

@@ -1,23 +1,15 @@
 """What Navigate asks of a vehicle, of what flies and of what drives: one name each, told apart by the rig's arrays."""
 
-import math
-from typing import Any
-
 import warp as wp
 
-from autopilot.ports import Estimate
-from common.rng import normal3
 from policies.tasks.flight.driven_vehicle import RoverArrays, vary_rover
 from policies.tasks.flight.flight_params import FlightParams
-from policies.tasks.flight.flown_vehicle import Makes, own_state, vary_vehicle, vehicle_estimate
+from policies.tasks.flight.flown_vehicle import Makes, own_state, vary_vehicle
 from policies.tasks.flight.own_state import OwnState
 from sim.advance import RigArrays
 from sim.truth import has_touched
 
 wp.set_module_options({"enable_backward": False})
-
-_ERROR_STREAM = wp.constant(10)
-_RAD_PER_DEG = wp.constant(math.pi / 180.0)
 
 
 @wp.func
@@ -43,21 +35,6 @@ def vary(  # noqa: F811
     episode: int,
 ) -> None:
     vary_rover(rig, makes, flight, 1.0, 1.0, seed, i, episode)
-
-
-@wp.func
-def attitude_error(error_deg: float, seed: int, i: int, episode: int) -> wp.quat:
-    """The turn by which the attitude that is told is off in an episode, about an axis of the world that is drawn."""
-    axis_ned = wp.normalize(normal3(seed, i, episode, _ERROR_STREAM))
-    return wp.quat_from_axis_angle(axis_ned, error_deg * _RAD_PER_DEG)
-
-
-@wp.func
-def reported_estimate(rig: Any, i: int, has_estimator: int, attitude_errors: wp.array(dtype=wp.quat)) -> Estimate:
-    """The state as the vehicle tells it, its attitude off by the error of the episode."""
-    estimate = vehicle_estimate(rig, i, has_estimator)
-    estimate.q_ned_from_frd = attitude_errors[i] * estimate.q_ned_from_frd
-    return estimate
 
 
 @wp.func
