@@ -171,7 +171,8 @@ class Flight(FlightBase):
         config = self.config
         make_ring = ring_of(drives=self.drives)
         ring = make_ring(self.rig, self.world, config.noise, config.seed) if config.has_lidar else None
-        return Surroundings(self.controller, self.rig, receiver, config.traffic_count, ring, config.home, config.seed)
+        traffic, lag_us = config.traffic_count, round(config.scan_lag_s * 1e6)
+        return Surroundings(self.controller, self.rig, receiver, traffic, ring, config.home, config.seed, lag_us)
 
     def _make_servers(
         self, script_end: Link, links: Sequence[Link | LinkSource], signing: SigningConfig | None

@@ -59,7 +59,7 @@ class FlightConfig(FlightSettings):
     is_forest: bool = False
     """The vehicle carries the scanner that policies of Navigate see by; the world is grown as in their training."""
     scan_lag_s: float = Field(default=0.0, ge=0.0, le=1.0)
-    """From what this scanner measures to its messages, besides the frame that they take."""
+    """From what this scanner, or the ring of range finders, measures to its messages, besides the frame they take."""
     owner: OwnerConfig | None = None
     """Who walks through the world with a phone, to be followed; the vehicle then carries a camera for its companion."""
 

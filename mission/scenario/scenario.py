@@ -108,7 +108,7 @@ class Policy(Part):
     guard: dict[str, Finite] = Field(default_factory=dict)
     """Settings of the guard by their names, as [its settings](guard-settings.md) list them: `{owner_m: 1.5}`."""
     scan_lag_s: float = Field(default=0.0, ge=0.0, le=1.0)
-    """Of the scans that policies of Navigate see by."""
+    """Of the scans that policies of Navigate and of Drive see by."""
 
     @model_validator(mode="after")
     def _has_such_a_guard(self) -> Self:

@@ -1,5 +1,8 @@
 """What is round the vehicle besides world and air: devices it carries, other aircraft, corrections for its receiver."""
 
+from collections import deque
+from collections.abc import Sequence
+
 from autopilot.flight_controller import FlightController
 from common.geodesy import GeoPoint
 from common.records import row_reader
@@ -30,6 +33,7 @@ class Surroundings:
         ring: looks round the vehicle, if it carries one.
         home: the middle of their area.
         seed: of their ways.
+        ring_lag_us: from what the ring measures until the flight controller has it [us].
     """
 
     def __init__(
@@ -41,11 +45,14 @@ class Surroundings:
         ring: RingSensor | GroundRing | None,
         home: GeoPoint,
         seed: int,
+        ring_lag_us: int = 0,
     ) -> None:
         state = controller.state
         self._controller = controller
         self._traffic = SimulatedTraffic(traffic_count, home, seed)
         self._ring = ring
+        self._ring_lag_us = ring_lag_us
+        self._under_way: deque[tuple[int, Sequence[float], float]] = deque()  # of the ring
         self._next_ring_us = 0 if ring is not None else 1 << 62
         self._next_traffic_us = 0 if traffic_count else 1 << 62
         self._receiver = receiver
@@ -61,7 +68,9 @@ class Surroundings:
         if self._ring is not None and time_us >= self._next_ring_us:
             self._next_ring_us = time_us + RING_PERIOD_US
             yaw = self._controller.state.yaw_rad
-            self._controller.obstacles.sensed(time_us, self._ring.measure(yaw), yaw)
+            self._under_way.append((time_us, self._ring.measure(yaw), yaw))
+        while self._under_way and time_us >= self._under_way[0][0] + self._ring_lag_us:
+            self._controller.obstacles.sensed(*self._under_way.popleft())
         if time_us >= self._next_traffic_us:
             self._next_traffic_us = time_us + TRAFFIC_PERIOD_US
             for aircraft in self._traffic.heard(time_us):
