@@ -87,13 +87,14 @@ def trained(preset: str) -> tuple[Path, float]:
     return path, took_s
 
 
-def judged(policy: Policy, preset: str, count: int = EPISODES) -> Drives:
-    """Every environment plays its first episode."""
+def judged(policy: Policy, preset: str, count: int = EPISODES, seed: int = SEED, scan_lag_s: float = 0.0) -> Drives:
+    """Every environment plays its first episode, its scans so late [s]."""
     settings = {"preset": preset, "has_estimator": True, "split": "test"}
     task = build_task("Drive", count, task_settings("Drive", settings))
     if not isinstance(task, Drive):
         raise TypeError(task)
-    task.reset(SEED)
+    task.set_params({"scan_lag_s": scan_lag_s})
+    task.reset(seed)
     outcomes, measures = first_episodes(policy, task, LONGEST)
     return Drives(outcomes, measures[:, MEASURES.index("time_s")])
 

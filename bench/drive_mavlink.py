@@ -1,10 +1,10 @@
-"""`python -m bench.drive_mavlink [SCENES] [park|reach] [sticks] [POLICY]`: Drive's policies over MAVLink.
+"""`python -m bench.drive_mavlink [SCENES] [park|reach] [sticks] [seed=N] [lag=SECONDS] [POLICY]`: Drive over MAVLink.
 
 One rover at a time, in lockstep: the whole flight controller, the messages of its ring of range finders, a companion
 computer with the policy, a goto sent to it. The scenes are those of the batch: held-out worlds, goals, headings at the
 start, wind, noise, masses, motors and tyres are drawn by the task, which then plays the same scenes itself. In: how
-many scenes, of what, by sticks or setpoints, which policy. Out: both rates side by side; of the policies that ship, in
-docs/results/drive.md.
+many scenes, of what, by sticks or setpoints, of which seed, how late the ranges come, which policy. Out: both rates
+side by side; of the policies that ship, in docs/results/drive.md.
 """
 
 import sys
@@ -67,13 +67,13 @@ class Scene:
     rows: dict[str, Any]
 
 
-def scenes_of(preset: str, count: int) -> list[Scene]:
+def scenes_of(preset: str, count: int, seed: int = SEED) -> list[Scene]:
     """The scenes of the batch's first episodes."""
     settings = task_settings("Drive", {"preset": preset, "has_estimator": True, "split": "test"})
     task = build_task("Drive", count, settings)
     if not isinstance(task, Drive):
         raise TypeError(task)
-    task.reset(SEED)
+    task.reset(seed)
     goals, noise = task.driving.goals.numpy(), task.driving.flight.numpy()["sensor_noise"]
     seeds = task.noise_seeds.numpy()
     names = ("model", "wind_model", "body", "truth")
@@ -89,8 +89,8 @@ def scenes_of(preset: str, count: int) -> list[Scene]:
     ]
 
 
-def driven(scene: Scene, pilot: DrivingPilot, *, is_by_sticks: bool = False) -> Arrival:
-    """One drive over MAVLink."""
+def driven(scene: Scene, pilot: DrivingPilot, *, is_by_sticks: bool = False, scan_lag_s: float = 0.0) -> Arrival:
+    """One drive over MAVLink, the ranges so late [s]."""
     config = FlightConfig(
         airframe="rover",
         has_lidar=True,
@@ -99,6 +99,7 @@ def driven(scene: Scene, pilot: DrivingPilot, *, is_by_sticks: bool = False) -> 
         seed=scene.seed,
         noise=scene.noise,
         parameters=REVERSES,
+        scan_lag_s=scan_lag_s,
     )
     flight, companion = flight_with_driver(config, pilot, is_by_sticks=is_by_sticks, world=scene.world, guard=UNGUARDED)
     try:
@@ -135,13 +136,22 @@ def row(preset: str, arrivals: list[Arrival], drives: Drives) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def measured(preset: str, policy: Policy, source: str, count: int, *, is_by_sticks: bool = False) -> str:
+def measured(
+    preset: str,
+    policy: Policy,
+    source: str,
+    count: int,
+    *,
+    is_by_sticks: bool = False,
+    seed: int = SEED,
+    scan_lag_s: float = 0.0,
+) -> str:
     """A line of the table, with what went wrong printed."""
-    drives = judged(policy, preset, count)
+    drives = judged(policy, preset, count, seed, scan_lag_s)
     pilot = DrivingPilot(policy, source)
     arrivals = []
-    for i, scene in enumerate(scenes_of(preset, count)):
-        arrivals.append(driven(scene, pilot, is_by_sticks=is_by_sticks))
+    for i, scene in enumerate(scenes_of(preset, count, seed)):
+        arrivals.append(driven(scene, pilot, is_by_sticks=is_by_sticks, scan_lag_s=scan_lag_s))
         if not arrivals[-1].is_there:
             print(i, arrivals[-1], Outcome(int(drives.outcomes[i])).name, flush=True)
     batch = drives.outcomes == Outcome.SUCCESS
@@ -162,16 +172,21 @@ def write_section(policies: dict[str, Path], scenes: int) -> None:
 
 
 def main(arguments: list[str]) -> int:
+    changed = dict(text.split("=", 1) for text in arguments if text.startswith(("seed=", "lag=")))
+    arguments = [text for text in arguments if not text.startswith(("seed=", "lag="))]
     count = next((int(text) for text in arguments if text.isdigit()), SCENES)
     presets = [preset for preset in AIMS if preset in arguments] or list(AIMS)
     named = [text for text in arguments if not text.isdigit() and text not in (*AIMS, "sticks")]
     is_by_sticks = "sticks" in arguments
-    if not is_by_sticks and not named and len(presets) == len(AIMS) and PAGE_FILE.is_file():
+    if not changed and not is_by_sticks and not named and len(presets) == len(AIMS) and PAGE_FILE.is_file():
         write_section({preset: find_policy(f"drive-{preset}") for preset in presets}, count)
         return 0
     for preset in presets:
         path = find_policy(named[0] if named else f"drive-{preset}")
-        print(measured(preset, load_policy(path)[0], str(path), count, is_by_sticks=is_by_sticks), flush=True)
+        seed, lag_s = int(changed.get("seed", SEED)), float(changed.get("lag", 0.0))
+        policy, _ = load_policy(path)
+        line = measured(preset, policy, str(path), count, is_by_sticks=is_by_sticks, seed=seed, scan_lag_s=lag_s)
+        print(line, flush=True)
     return 0
 
 
