@@ -50,7 +50,7 @@ reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow
 	@$(BIN)/python -m bench.follow $(ARGS)
 
 reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in three legs of three seeds, choose and judge it (two hours); only choose: ARGS="judge"
-	@$(BIN)/python -m bench.navigate_training $(ARGS)
+	@$(BIN)/python -m bench.training_seeds navigate $(ARGS)
 	@$(BIN)/python -m bench.navigate results/navigate-chosen.pt
 
 reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policy from nothing, and judge it (a quarter of an hour)

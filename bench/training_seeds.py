@@ -1,96 +1,166 @@
-"""`python -m bench.navigate_training [judge]`: Navigate's policy from nothing, three seeds, and which of them is best.
+"""`python -m bench.training_seeds NAME [judge] [test] [POLICY …]`: three seeds of a policy, and which of them is best.
 
-In: the recipes of its three legs. Out: results/navigate-seed-N with a run of each leg, a table of how the last ones do
-in validation forests, their scans 0 to 0.2 s late, and the best as results/navigate-chosen.pt. With `judge`, or policy
-files, it judges only. What is chosen by is neither trained on nor flown in the tests.
+In: `navigate`, `drive-park` or `drive-reach`, and the recipes of its legs. Out: results/NAME-seed-N with a run of each
+leg, a table of how the last ones do in validation worlds, their scans 0 to 0.2 s late, and the best as
+results/NAME-chosen.pt. With `judge`, or policy files, it judges only. What is chosen by is neither trained on nor
+of the tests; with `test` the worlds are those of the tests, and nothing is chosen.
 """
 
 import subprocess
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from bench.navigate import Flights, build, fly
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.drive import LONGEST as DRIVE_LONGEST
+from bench.goal_episodes import Outcomes, first_episodes
+from bench.navigate import LONGEST as NAVIGATE_LONGEST
 from common.files import write_whole
+from common.intervals import Interval, rate
 from policies.learn.export.policy_file import load_policy
+from policies.tasks.catalogue import build_task, task_settings
+from policies.tasks.drive.drive import Drive
+from policies.tasks.drive.drive_kernels import MEASURES as DRIVE_MEASURES
 from policies.tasks.episode import Outcome
+from policies.tasks.navigate.navigate import Navigate
+from policies.tasks.navigate.navigate_kernels import MEASURES as NAVIGATE_MEASURES
 
-LEGS = ("navigate", "navigate-careful", "navigate-late")  # each goes on from the one before
 SEEDS = (1, 2, 3)
 LAGS_S = (0.0, 0.1, 0.2)
-TREES_PER_HA = 600.0
-EPISODES = 250  # of each lag
+WORLDS_SEED = 1_000_003  # no training run is given it
 RESULTS = Path("results")
-CHOSEN = RESULTS / "navigate-chosen.pt"
 HEAD = (
     "| policy | " + " | ".join(f"{1000 * lag_s:.0f} ms late" for lag_s in LAGS_S) + " |\n|" + "---|" * (1 + len(LAGS_S))
 )
 
+Measures = NDArray[np.float32]
+
+
+def mean_speed(outcomes: Outcomes, measures: Measures) -> str:
+    """Of the flights that arrived [m/s]."""
+    arrived = measures[outcomes == Outcome.SUCCESS]
+    speeds = arrived[:, NAVIGATE_MEASURES.index("path_m")] / arrived[:, NAVIGATE_MEASURES.index("time_s")]
+    return f"{speeds.mean():.2f} m/s" if len(speeds) else "-"
+
+
+def touched_and_time(outcomes: Outcomes, measures: Measures) -> str:
+    """How many of the drives touched something [%], and how long those took that arrived [s]."""
+    times_s = measures[outcomes == Outcome.SUCCESS, DRIVE_MEASURES.index("time_s")]
+    touched = f"touched {100 * rate(outcomes == Outcome.HIT_OBSTACLE).value:.1f} %"
+    return f"{touched}, {times_s.mean():.1f} s" if len(times_s) else touched
+
+
+@dataclass(frozen=True, slots=True)
+class Story:
+    """What is trained, and what it is judged in."""
+
+    task: str
+    legs: tuple[str, ...]  # recipes, each of which goes on from the one before
+    longest: int  # decisions of an episode; time is up before
+    besides: Callable[[Outcomes, Measures], str]  # success, for the table
+    episodes: int  # of each lag
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+
+STORIES = {
+    "navigate": Story(
+        "Navigate",
+        ("navigate", "navigate-careful", "navigate-late"),
+        NAVIGATE_LONGEST,
+        mean_speed,
+        episodes=250,
+        numbers={"trees_per_ha": 600.0},
+    ),
+    "drive-park": Story("Drive", ("drive-park-late",), DRIVE_LONGEST, touched_and_time, episodes=1000),
+    "drive-reach": Story("Drive", ("drive-reach-late",), DRIVE_LONGEST, touched_and_time, episodes=1000),
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A policy in validation forests: what it came to with scans of each lag."""
+    """What a policy came to with scans of each lag."""
 
     path: Path
-    flights: tuple[Flights, ...]
+    success: tuple[Interval, ...]
+    besides: tuple[str, ...]
 
     @property
     def low(self) -> float:
         """How good it is at least: the mean of where the intervals begin."""
-        return sum(flown.fraction(Outcome.SUCCESS).low for flown in self.flights) / len(self.flights)
+        return sum(each.low for each in self.success) / len(self.success)
 
     @property
     def row(self) -> str:
         cells = [str(self.path)]
-        for flown in self.flights:
-            reached, speed = flown.fraction(Outcome.SUCCESS), flown.speed(is_straight=False)
+        for reached, besides in zip(self.success, self.besides, strict=True):
             within = f"{100 * reached.low:.1f} to {100 * reached.high:.1f}"
-            cells.append(f"{100 * reached.value:.1f} % ({within}), {speed.value:.2f} m/s")
+            cells.append(f"{100 * reached.value:.1f} % ({within}), {besides}")
         return "| " + " | ".join(cells) + " |"
 
 
-def train(seed: int) -> Path:
+def train(name: str, seed: int) -> Path:
     """The policy of the last leg; the legs are runs in a folder of their seed."""
-    folder = RESULTS / f"navigate-seed-{seed}"
+    folder = _folder(name, seed)
     folder.mkdir(parents=True, exist_ok=True)
-    for leg in LEGS:  # a recipe names the policy that it goes on from as it lies beside it
+    for leg in STORIES[name].legs:  # a recipe names the policy that it goes on from as it lies beside it
         command = [sys.executable, "-c", "from mission.cli import main; main()"]
         subprocess.run(
             [*command, "train", leg, "--run-id", leg, "--seed", str(seed), "--force"], cwd=folder, check=True
         )
-    return policy_of(seed)
+    return policy_of(name, seed)
 
 
-def policy_of(seed: int) -> Path:
+def policy_of(name: str, seed: int) -> Path:
     """Where the policy of a seed lies once it is trained."""
-    return RESULTS / f"navigate-seed-{seed}" / "results" / LEGS[-1] / "Navigate.pt"
+    story = STORIES[name]
+    return _folder(name, seed) / "results" / story.legs[-1] / f"{story.task}.pt"
 
 
-def judged(path: Path) -> Judged:
-    """A policy in the validation forests, on the flight controller's estimate."""
+def _folder(name: str, seed: int) -> Path:
+    return RESULTS / f"{name}-seed-{seed}"
+
+
+def judged(story: Story, path: Path, split: str = "validation", lags_s: Sequence[float] = LAGS_S) -> Judged:
+    """A policy in held-out worlds, on the flight controller's estimate."""
     policy, card = load_policy(path)
-    settings = {key: str(value) for key, value in card.settings.items()} | {"has_estimator": "true"}
-    flights = []
-    for lag_s in LAGS_S:
-        task = build(settings, TREES_PER_HA, EPISODES, scan_lag_s=lag_s, split="validation")
-        task.layout.require(policy.layout, str(path))
-        flights.append(fly(policy, task))
-    return Judged(path, tuple(flights))
+    settings: dict[str, Any] = card.settings | {"has_estimator": True, "split": split}
+    task = build_task(story.task, story.episodes, task_settings(story.task, settings))
+    if not isinstance(task, Navigate | Drive):
+        raise TypeError(task)
+    task.layout.require(policy.layout, str(path))
+    success, besides = [], []
+    for lag_s in lags_s:
+        task.set_params({**story.numbers, "scan_lag_s": lag_s})
+        task.reset(WORLDS_SEED)
+        outcomes, measures = first_episodes(policy, task, story.longest)
+        success.append(rate(outcomes == Outcome.SUCCESS))
+        besides.append(story.besides(outcomes, measures))
+    return Judged(path, tuple(success), tuple(besides))
 
 
 def main(arguments: Sequence[str]) -> int:
-    named = [Path(text) for text in arguments if text != "judge"]
-    paths = named or [policy_of(seed) if arguments else train(seed) for seed in SEEDS]
+    if not arguments or arguments[0] not in STORIES:
+        print(f"training_seeds: name one of {', '.join(STORIES)}")
+        return 2
+    name, words = arguments[0], arguments[1:]
+    named = [Path(text) for text in words if text not in ("judge", "test")]
+    split = "test" if "test" in words else "validation"
+    paths = named or [policy_of(name, seed) if words else train(name, seed) for seed in SEEDS]
     print(HEAD, flush=True)
     found = []
     for path in paths:
-        found.append(judged(path))
+        found.append(judged(STORIES[name], path, split))
         print(found[-1].row, flush=True)
+    if split == "test":
+        return 0
     best = max(found, key=lambda each: each.low)
     print(f"chosen: {best.path}, whose intervals begin at {100 * best.low:.1f} % on average")
     if not named:
-        write_whole(CHOSEN, best.path.read_bytes())
+        write_whole(RESULTS / f"{name}-chosen.pt", best.path.read_bytes())
     return 0
 
 
