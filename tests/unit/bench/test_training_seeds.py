@@ -1,0 +1,30 @@
+"""How the policy that ships is chosen among those of several seeds."""
+
+from pathlib import Path
+
+import pytest
+
+from bench.training_seeds import STORIES, Judged, main
+from common.intervals import Interval
+from policies.learn.config.load import load_config
+from policies.learn.config.recipes import recipe
+
+
+@pytest.mark.parametrize("name", STORIES)
+def test_legs_are_recipes_of_the_task_and_the_last_has_late_scans(name):
+    story = STORIES[name]
+    configs = [load_config(recipe(leg)).config for leg in story.legs]
+    assert {config.env_settings.env_path for config in configs} == {story.task}
+    assert {"scan_lag_s", "attitude_error_deg"} <= set(configs[-1].environment_parameters)
+
+
+def test_a_policy_is_as_good_as_its_intervals_begin_on_average():
+    success = (Interval(0.9, 0.8, 1.0), Interval(0.8, 0.7, 0.9), Interval(0.5, 0.3, 0.7))
+    judged = Judged(Path("a.pt"), success, ("1 s", "2 s", "3 s"))
+    assert judged.low == pytest.approx(0.6)
+    assert judged.row.startswith("| a.pt | 90.0 % (80.0 to 100.0), 1 s | 80.0 % (70.0 to 90.0), 2 s |")
+
+
+def test_a_policy_that_is_not_known_is_refused(capsys):
+    assert main(["hover"]) == 2
+    assert "name one of navigate, drive-park, drive-reach" in capsys.readouterr().out
