@@ -75,8 +75,8 @@ STORIES = {
         episodes=250,
         numbers={"trees_per_ha": 600.0},
     ),
-    "drive-park": Story("Drive", ("drive-park-late",), DRIVE_LONGEST, touched_and_time, episodes=1000),
-    "drive-reach": Story("Drive", ("drive-reach-late",), DRIVE_LONGEST, touched_and_time, episodes=1000),
+    "drive-park": Story("Drive", ("drive-park-late",), DRIVE_LONGEST, touched_and_time, episodes=250),
+    "drive-reach": Story("Drive", ("drive-reach-late",), DRIVE_LONGEST, touched_and_time, episodes=250),
 }
 
 
