@@ -68,6 +68,15 @@ STAGES: dict[str, Stage] = {
             ships=False,
         ),
         Stage(
+            "late",
+            "Hardened: the improved student goes on in late, lost, dark and depthless images, DAgger",
+            "follow-me-late",
+            teacher="teacher",
+            start="student",
+            flies=True,
+            limit_s=3600.0,
+        ),
+        Stage(
             "vision-only",
             "Vision only: no word of the owner, DAgger",
             "follow-me-vision",
