@@ -1,11 +1,13 @@
 """What is kept of a golden flight, and in what two such records differ.
 
 Kept are the figures of its summary, a hash of each ULog topic, and one of each log file. Machines whose processor or
-mathematical library rounds otherwise fly a little otherwise: a probe that knows nothing of this project tells them
-apart, and there the figures are compared within a tolerance.
+mathematical library rounds otherwise fly a little otherwise: the processor's kind, for networks are computed by what it
+can do, and a probe that knows nothing of this project tell them apart, and there the figures are compared within a
+tolerance.
 """
 
 import hashlib
+import platform
 from collections.abc import Callable, Iterator
 from math import isclose
 from pathlib import Path
@@ -43,7 +45,16 @@ def machine() -> str:
     out = wp.zeros(PROBES, dtype=wp.float32, device="cpu")
     wp.launch(_probe, dim=PROBES, inputs=[wp.array(x, device="cpu"), out], device="cpu")
     own = np.concatenate([np.sin(x * 7.0), np.exp(-x), np.linalg.inv(np.outer(x[:6], x[3:9]) + np.eye(6)).ravel()])
-    return _hash(out.numpy().tobytes() + own.tobytes())
+    return _hash(out.numpy().tobytes() + own.tobytes() + _processor().encode())
+
+
+def _processor() -> str:
+    """Its family, model and what it can do, as Linux tells; elsewhere its name."""
+    cpuinfo = Path("/proc/cpuinfo")
+    if not cpuinfo.is_file():
+        return platform.processor()
+    told = dict(line.split("\t", 1) for line in cpuinfo.read_text().split("\n\n")[0].splitlines() if "\t" in line)
+    return " ".join(told.get(key, "") for key in ("vendor_id", "cpu family", "model", "stepping", "flags"))
 
 
 def flown(flight: Callable[[Path], Summary]) -> Record:
