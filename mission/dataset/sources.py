@@ -24,7 +24,7 @@ from mission.view.replay_file import ATTITUDE, CONFIG_KEY, PLACE, config_of, inf
 from policies.companion.decision_log import IMAGE_LAYOUT_KEY, LAYOUT_KEY, PILOT_KEY, TOPIC
 from policies.datasets.decisions import DecisionRows, TruthRows
 from policies.datasets.episodes import DatasetError
-from policies.tasks.layout import Layout
+from policies.tasks.layout import Layout, LayoutError
 
 SENSED = "sensor_combined"
 JOLT_M_S2 = 7.0
@@ -118,11 +118,17 @@ def read_flight(path: Path, *, by_truth: bool = True, by_images: bool = False) -
     layout_key = IMAGE_LAYOUT_KEY if by_images else LAYOUT_KEY
     try:
         layout = Layout.from_record(json.loads(info_text(log, layout_key)))
+        if by_images:  # what it is judged by
+            from policies.companion.tracked_recorder import RECORD_LAYOUT
+
+            RECORD_LAYOUT.require(Layout.from_record(json.loads(info_text(log, LAYOUT_KEY))), f"{path}: {TOPIC}")
         config = config_of(info_text(log, CONFIG_KEY), path.parent) if CONFIG_KEY in infos else None
         arrays = {name: vector(columns, name) for name in ("frame", "action", "flown", "pos_ned", "vel_ned", "goal")}
         for name in ("yaw", "i_image", "is_flying", "is_first"):
             arrays[name] = columns[name]
         arrays["seen"] = vector(columns, "vector") if by_images else arrays["frame"]
+    except LayoutError as error:
+        raise DatasetError(str(error)) from error
     except (KeyError, ValueError, TypeError) as error:
         raise DatasetError(f"{path}: {TOPIC}: damaged, or of another version") from error
     rows = DecisionRows(

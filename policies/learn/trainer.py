@@ -190,10 +190,10 @@ class Training:
             self.period.add(iteration.scores, iteration.statistics)
             if iteration.evaluation is not None:
                 self.recent.clear()
-                if self.behavior.keep_best:
-                    judged = iteration.evaluation
-                    self._best.offer(self.learner.policy, self._card(), judged, judged.mean_return)
             self.recent.add(iteration.scores)
+            if iteration.evaluation is not None and self.behavior.keep_best and self._target is None:
+                judged = iteration.evaluation
+                self._best.offer(self.learner.policy, self._card(), judged, judged.mean_return)
             self._moments.append((wall_time_s(), steps))
             self.watcher.show(self._progress())
             self._advance(iteration.scores)
@@ -229,7 +229,7 @@ class Training:
             if self._judged is not None:
                 values["Environment/Judged Success Rate"] = self._judged.success_rate
                 is_reached = self._target.is_reached(self._judged)
-                if self.behavior.keep_best and not self.behavior.is_offline:
+                if self.behavior.keep_best:
                     self._best.offer(self.learner.policy, self._card(), self._judged, self._judged.success_rate)
         self._events.write(self.learner.steps, values)
         return is_reached
@@ -270,7 +270,8 @@ class Training:
         """Writes the trained policy."""
         policy, card, judged = self.learner.policy, self._card(), self._judged
         if self._best.judged is not None:
-            (policy, card), judged = self._best.restored(), self._best.judged
+            policy, card = self._best.restored()
+            judged = self._best.judged if self._target is not None else None  # what chose it is no judgement of it
         save_policy(self.folder.policy, policy, card)
         self._export(self.folder.network, policy)
         self.folder.write_status(self._status() | {"end": end})

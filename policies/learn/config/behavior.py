@@ -239,8 +239,8 @@ class Behavior(Block):
     success_target: FractionOrNone = own_key(None)
     """Training ends when this fraction of episodes succeeds; none: at max_steps only."""
     keep_best: bool = own_key(False)
-    """Whether the trained policy is the one that did best when it was held against success_target, or, learnt from a
-    dataset, the one that returned most in an evaluation; not the last."""
+    """Whether the trained policy is the one that did best when it was held against success_target, or, where a
+    dataset is learnt from without a target, the one that returned most in an evaluation; not the last."""
 
     @field_validator("self_play", mode="before")
     @classmethod
@@ -260,16 +260,15 @@ class Behavior(Block):
 
     @model_validator(mode="after")
     def _best_is_reported(self) -> Self:
-        if self.keep_best and self.success_target is None and not self.is_offline:
+        if not self.keep_best or self.success_target is not None:
+            return self
+        if not isinstance(self.hyperparameters, OfflineHyperparameters):
             raise ValueError("keep_best: takes a success_target, against which policies are held")
-        if self.keep_best and self.offline is not None and self.is_offline and not self.offline.evaluation_episodes:
-            raise ValueError("keep_best: takes evaluations, and evaluation_episodes of offline are 0")
+        if self.offline is not None and not self.offline.evaluation_episodes:
+            raise ValueError(
+                "keep_best: takes evaluations or a success_target, and evaluation_episodes of offline are 0"
+            )
         return self
-
-    @property
-    def is_offline(self) -> bool:
-        """Whether it learns from a dataset alone."""
-        return isinstance(self.hyperparameters, OfflineHyperparameters)
 
     @model_validator(mode="after")
     def _data_are_named(self) -> Self:

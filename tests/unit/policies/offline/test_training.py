@@ -98,21 +98,66 @@ def test_a_trained_policy_is_a_policy_as_all_others(tmp_path, roller_ball):
         assert tag in curves
 
 
+class Returns:
+    """Judges in place of the simulator: returns in this order, and what was judged."""
+
+    def __init__(self, *returns):
+        self.returns, self.seen = iter(returns), []
+
+    def __call__(self, policy):
+        self.seen.append({name: value.clone() for name, value in policy.state_dict().items()})
+        return Evaluation({"success": 1, "timeout": 7}, next(self.returns), 10.0)
+
+
+BEST = {"trainer_type": "bc", "keep_best": True, "max_steps": 600, "summary_freq": 200}
+EVERY_200 = {"evaluation_interval": 200, "evaluation_episodes": 8}
+
+
 def test_the_policy_that_returned_most_is_what_training_ends_with(tmp_path, roller_ball):
-    best = {"trainer_type": "bc", "keep_best": True, "max_steps": 600}
-    offline = {"evaluation_interval": 200, "evaluation_episodes": 8}
-    training = Training(config(tmp_path, roller_ball, best, offline=offline), StopAfter())
-    judgements, seen = iter((1.0, 3.0, 2.0)), []
-
-    def judge(policy):
-        seen.append({name: value.clone() for name, value in policy.state_dict().items()})
-        return Evaluation({"success": 1, "timeout": 7}, next(judgements), 10.0)
-
-    training.learner._judge = judge
+    training = Training(config(tmp_path, roller_ball, BEST, offline=EVERY_200), StopAfter())
+    training.learner._judge = judge = Returns(1.0, 3.0, 2.0)
     result = training.run()
     policy, card = load_policy(result.policy)
-    assert same(dict(policy.state_dict()), seen[1])
-    assert card.steps == 400
+    assert same(dict(policy.state_dict()), judge.seen[1])
+    assert (card.steps, card.figures["training_reward"]) == (400, 3.0)
+    assert result.judged is None  # the evaluation that chose it is no judgement of it
+
+
+def test_the_best_of_all_evaluations_is_known_after_a_stop(tmp_path, roller_ball):
+    stopped = Training(config(tmp_path, roller_ball, BEST, offline=EVERY_200), StopAfter(2))
+    stopped.learner._judge = before = Returns(1.0, 3.0)
+    stopped.run()
+    resumed = Training(config(tmp_path, roller_ball, BEST, offline=EVERY_200, resume=True), StopAfter())
+    resumed.learner._judge = Returns(2.0)
+    assert same(dict(load_policy(resumed.run().policy)[0].state_dict()), before.seen[1])
+
+
+def test_the_best_takes_evaluations(tmp_path, roller_ball):
+    with pytest.raises(ValidationError, match="evaluation_episodes of offline are 0"):
+        config(tmp_path, roller_ball, BEST, offline={"evaluation_episodes": 0})
+
+
+def test_with_a_target_the_policy_that_reached_it_is_kept(tmp_path, roller_ball):
+    training = Training(config(tmp_path, roller_ball, BEST | {"success_target": 0.5}, offline=EVERY_200), StopAfter())
+    training.learner._judge = Returns(3.0, 1.0, 2.0)
+    training._target = target = Reached()
+    result = training.run()
+    assert result.end == "success_target"
+    assert same(dict(load_policy(result.policy)[0].state_dict()), target.judged[-1])
+
+
+class Reached:
+    """A target that the second policy reaches that is held against it."""
+
+    def __init__(self):
+        self.judged = []
+
+    def judge(self, policy, *_):
+        self.judged.append({name: value.clone() for name, value in policy.state_dict().items()})
+        return Evaluation({"success": len(self.judged), "timeout": 2}, 0.0, 10.0)
+
+    def is_reached(self, judged):
+        return judged.outcomes["success"] == 2
 
 
 def test_a_run_is_not_gone_on_with_on_other_data(tmp_path, roller_ball):
