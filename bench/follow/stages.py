@@ -74,6 +74,7 @@ STAGES: dict[str, Stage] = {
             teacher="teacher",
             start="student",
             flies=True,
+            ships=False,
             limit_s=3600.0,
         ),
         Stage(

@@ -49,12 +49,17 @@ def machine() -> str:
 
 
 def _processor() -> str:
-    """Its family, model and what it can do, as Linux tells; elsewhere its name."""
+    """Its family and model and how it can calculate, as Linux tells; elsewhere its name."""
     cpuinfo = Path("/proc/cpuinfo")
     if not cpuinfo.is_file():
         return platform.processor()
-    told = dict(line.split("\t", 1) for line in cpuinfo.read_text().split("\n\n")[0].splitlines() if "\t" in line)
-    return " ".join(told.get(key, "") for key in ("vendor_id", "cpu family", "model", "stepping", "flags"))
+    pairs = (line.split(":", 1) for line in cpuinfo.read_text().split("\n\n")[0].splitlines() if ":" in line)
+    told = {name.strip(): value.strip() for name, value in pairs}
+    kinds = (
+        told.get(key, "") for key in ("vendor_id", "cpu family", "model", "CPU implementer", "CPU part", "Features")
+    )
+    vectors = (flag for flag in sorted(told.get("flags", "").split()) if flag.startswith(("avx", "amx", "fma")))
+    return " ".join((*kinds, *vectors))
 
 
 def flown(flight: Callable[[Path], Summary]) -> Record:
