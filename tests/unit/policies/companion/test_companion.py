@@ -107,6 +107,22 @@ def test_a_policy_that_does_not_decide_hands_back_and_sends_no_number_that_is_no
     assert air.companion.phase is Phase.READY
 
 
+def test_the_setpoint_of_a_decision_is_sent_before_it_is_noted():
+    air = flown_air()
+    sent, noted = [], []
+
+    def take(decision):
+        sent.extend(decode(frame) for data in air.end.receive() for frame in air._reader.feed(data))
+        noted.append((decision.time_us, [m.fields.vx for m in sent if m.name == "SET_POSITION_TARGET_LOCAL_NED"]))
+        sent.clear()
+
+    air.companion.skill.keep_records()
+    air.companion.on_decision = take
+    air.run(0.5)
+    assert len(noted) == 5
+    assert all(velocities for _, velocities in noted)
+
+
 def test_two_companions_at_once_hold_until_one_has_gone():
     air = flown_air()
     air.end.send(encode("HEARTBEAT", 1, COMPONENT, 0, type=18, autopilot=8))
