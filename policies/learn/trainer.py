@@ -188,12 +188,11 @@ class Training:
             iteration = self.learner.iterate()
             steps = self.learner.steps
             self.period.add(iteration.scores, iteration.statistics)
-            if iteration.evaluation is not None:
+            if (evaluation := iteration.evaluation) is not None:
                 self.recent.clear()
             self.recent.add(iteration.scores)
-            if iteration.evaluation is not None and self.behavior.keep_best and self._target is None:
-                judged = iteration.evaluation
-                self._best.offer(self.learner.policy, self._card(), judged, judged.mean_return)
+            if evaluation is not None and self.behavior.keep_best and self._target is None:
+                self._best.offer(self.learner.policy, self._card(), evaluation, evaluation.mean_return)
             self._moments.append((wall_time_s(), steps))
             self.watcher.show(self._progress())
             self._advance(iteration.scores)
