@@ -78,12 +78,20 @@ class Flights:
 
     def speed(self, is_straight: bool) -> Interval:
         """Mean over the flights that arrived of the way flown, or made towards the goal, over the time [m/s]."""
-        arrived = self.measures[self.outcomes == Outcome.SUCCESS]
-        made_m = arrived[:, MEASURES.index("path_m")]
-        if is_straight:
-            made_m = arrived[:, MEASURES.index("start_distance_m")] - arrived[:, MEASURES.index("distance_m")]
-        speeds = made_m / arrived[:, MEASURES.index("time_s")]
+        speeds = arrival_speeds(self.outcomes, self.measures, is_straight)
         return bootstrap(len(speeds), lambda rows: float(speeds[rows].mean()) if len(rows) else float("nan"))
+
+
+def arrival_speeds(
+    outcomes: NDArray[np.int32], measures: NDArray[np.float32], is_straight: bool = False
+) -> NDArray[np.float32]:
+    """Of each flight that arrived the way flown, or made towards the goal, over the time [m/s], shape (arrived,)."""
+    arrived = measures[outcomes == Outcome.SUCCESS]
+    made_m = arrived[:, MEASURES.index("path_m")]
+    if is_straight:
+        made_m = arrived[:, MEASURES.index("start_distance_m")] - arrived[:, MEASURES.index("distance_m")]
+    speeds: NDArray[np.float32] = made_m / arrived[:, MEASURES.index("time_s")]
+    return speeds
 
 
 def build(
@@ -92,14 +100,12 @@ def build(
     episodes: int,
     name: str = "Navigate",
     seed: int = SEED,
-    scan_lag_s: float = 0.0,
-    split: str = "test",
 ) -> Navigate:
     """Held-out environments of one density."""
-    task = build_task(name, episodes, task_settings(name, settings | {"split": split}))
+    task = build_task(name, episodes, task_settings(name, settings | {"split": "test"}))
     if not isinstance(task, Navigate):
         raise TypeError(task)
-    task.set_params({"trees_per_ha": trees_per_ha, "scan_lag_s": scan_lag_s})
+    task.set_params({"trees_per_ha": trees_per_ha})
     task.reset(seed)
     return task
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from bench.drive import LONGEST as DRIVE_LONGEST
 from bench.goal_episodes import Outcomes, first_episodes
 from bench.navigate import LONGEST as NAVIGATE_LONGEST
+from bench.navigate import arrival_speeds
 from common.files import write_whole
 from common.intervals import Interval, rate
 from policies.learn.export.policy_file import load_policy
@@ -27,7 +28,6 @@ from policies.tasks.drive.drive import Drive
 from policies.tasks.drive.drive_kernels import MEASURES as DRIVE_MEASURES
 from policies.tasks.episode import Outcome
 from policies.tasks.navigate.navigate import Navigate
-from policies.tasks.navigate.navigate_kernels import MEASURES as NAVIGATE_MEASURES
 
 SEEDS = (1, 2, 3)
 LAGS_S = (0.0, 0.1, 0.2)
@@ -42,8 +42,7 @@ Measures = NDArray[np.float32]
 
 def mean_speed(outcomes: Outcomes, measures: Measures) -> str:
     """Of the flights that arrived [m/s]."""
-    arrived = measures[outcomes == Outcome.SUCCESS]
-    speeds = arrived[:, NAVIGATE_MEASURES.index("path_m")] / arrived[:, NAVIGATE_MEASURES.index("time_s")]
+    speeds = arrival_speeds(outcomes, measures)
     return f"{speeds.mean():.2f} m/s" if len(speeds) else "-"
 
 
@@ -55,7 +54,7 @@ def touched_and_time(outcomes: Outcomes, measures: Measures) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Story:
+class Training:
     """What is trained, and what it is judged in."""
 
     task: str
@@ -66,8 +65,8 @@ class Story:
     numbers: Mapping[str, float] = field(default_factory=dict)
 
 
-STORIES = {
-    "navigate": Story(
+TRAININGS = {
+    "navigate": Training(
         "Navigate",
         ("navigate", "navigate-careful", "navigate-late"),
         NAVIGATE_LONGEST,
@@ -75,8 +74,8 @@ STORIES = {
         episodes=250,
         numbers={"trees_per_ha": 600.0},
     ),
-    "drive-park": Story("Drive", ("drive-park-late",), DRIVE_LONGEST, touched_and_time, episodes=250),
-    "drive-reach": Story("Drive", ("drive-reach-late",), DRIVE_LONGEST, touched_and_time, episodes=250),
+    "drive-park": Training("Drive", ("drive-park-late",), DRIVE_LONGEST, touched_and_time, episodes=250),
+    "drive-reach": Training("Drive", ("drive-reach-late",), DRIVE_LONGEST, touched_and_time, episodes=250),
 }
 
 
@@ -106,7 +105,7 @@ def train(name: str, seed: int) -> Path:
     """The policy of the last leg; the legs are runs in a folder of their seed."""
     folder = _folder(name, seed)
     folder.mkdir(parents=True, exist_ok=True)
-    for leg in STORIES[name].legs:  # a recipe names the policy that it goes on from as it lies beside it
+    for leg in TRAININGS[name].legs:  # a recipe names the policy that it goes on from as it lies beside it
         command = [sys.executable, "-c", "from mission.cli import main; main()"]
         subprocess.run(
             [*command, "train", leg, "--run-id", leg, "--seed", str(seed), "--force"], cwd=folder, check=True
@@ -116,35 +115,35 @@ def train(name: str, seed: int) -> Path:
 
 def policy_of(name: str, seed: int) -> Path:
     """Where the policy of a seed lies once it is trained."""
-    story = STORIES[name]
-    return _folder(name, seed) / "results" / story.legs[-1] / f"{story.task}.pt"
+    training = TRAININGS[name]
+    return _folder(name, seed) / "results" / training.legs[-1] / f"{training.task}.pt"
 
 
 def _folder(name: str, seed: int) -> Path:
     return RESULTS / f"{name}-seed-{seed}"
 
 
-def judged(story: Story, path: Path, split: str = "validation", lags_s: Sequence[float] = LAGS_S) -> Judged:
+def judged(training: Training, path: Path, split: str = "validation", lags_s: Sequence[float] = LAGS_S) -> Judged:
     """A policy in held-out worlds, on the flight controller's estimate."""
     policy, card = load_policy(path)
     settings: dict[str, Any] = card.settings | {"has_estimator": True, "split": split}
-    task = build_task(story.task, story.episodes, task_settings(story.task, settings))
+    task = build_task(training.task, training.episodes, task_settings(training.task, settings))
     if not isinstance(task, Navigate | Drive):
         raise TypeError(task)
     task.layout.require(policy.layout, str(path))
     success, besides = [], []
     for lag_s in lags_s:
-        task.set_params({**story.numbers, "scan_lag_s": lag_s})
+        task.set_params({**training.numbers, "scan_lag_s": lag_s})
         task.reset(WORLDS_SEED)
-        outcomes, measures = first_episodes(policy, task, story.longest)
+        outcomes, measures = first_episodes(policy, task, training.longest)
         success.append(rate(outcomes == Outcome.SUCCESS))
-        besides.append(story.besides(outcomes, measures))
+        besides.append(training.besides(outcomes, measures))
     return Judged(path, tuple(success), tuple(besides))
 
 
 def main(arguments: Sequence[str]) -> int:
-    if not arguments or arguments[0] not in STORIES:
-        print(f"training_seeds: name one of {', '.join(STORIES)}")
+    if not arguments or arguments[0] not in TRAININGS:
+        print(f"training_seeds: name one of {', '.join(TRAININGS)}")
         return 2
     name, words = arguments[0], arguments[1:]
     named = [Path(text) for text in words if text not in ("judge", "test")]
@@ -153,7 +152,7 @@ def main(arguments: Sequence[str]) -> int:
     print(HEAD, flush=True)
     found = []
     for path in paths:
-        found.append(judged(STORIES[name], path, split))
+        found.append(judged(TRAININGS[name], path, split))
         print(found[-1].row, flush=True)
     if split == "test":
         return 0

@@ -4,15 +4,15 @@ from pathlib import Path
 
 import pytest
 
-from bench.training_seeds import STORIES, Judged, main
+from bench.training_seeds import TRAININGS, Judged, main
 from common.intervals import Interval
 from policies.learn.config.load import load_config
 from policies.learn.config.recipes import recipe
 
 
-@pytest.mark.parametrize("name", STORIES)
+@pytest.mark.parametrize("name", TRAININGS)
 def test_legs_are_recipes_of_the_task_and_the_last_has_late_scans(name):
-    story = STORIES[name]
+    story = TRAININGS[name]
     configs = [load_config(recipe(leg)).config for leg in story.legs]
     assert {config.env_settings.env_path for config in configs} == {story.task}
     assert {"scan_lag_s", "attitude_error_deg"} <= set(configs[-1].environment_parameters)
