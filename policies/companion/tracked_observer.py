@@ -55,7 +55,7 @@ class TrackedObserver:
         self.flown((own.vel_ned[0], own.vel_ned[1], 0.0), 0.0)
 
     def flown(self, vel_ned: Vector, yaw_rate: float) -> None:
-        """What was asked for in the end, from which the next action goes on."""
+        """From what the next action goes on."""
         self._command["vel_ned"][0] = vel_ned
         self._command["yaw_rate"][0] = yaw_rate if yaw_rate == yaw_rate else 0.0
 

@@ -37,6 +37,7 @@ _SEARCH_ROUNDS_S = 13.0  # and then round itself
 _THERE_M = 2.0  # so near the stand-off it looks round
 _RISEN_US = 2_000_000  # for so long it stays over the owner
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
+_KEPT_M_S = 1.5  # so much of what things take off a velocity the next decision may go on from
 
 
 class Stance(Enum):
@@ -65,6 +66,9 @@ class Guard:
         self.interventions = Interventions()
         self._begun_us = 0  # when the policy took over, on the vehicle's clock
         self._flown = np.zeros(2)  # what was let be flown last
+        self.goes_on_from = np.zeros(2)
+        """The level velocity [m/s] from which a pilot goes on who changes it by steps: as flown, with some of what
+        things took off it. From what was flown alone, steps towards a trunk and turns off it come to a stand there."""
         self._is_too_near = False
         self._sinking_max = 0.0  # [m/s] of who is too near
         self._risen_us = NEVER_US  # when it rose over the owner last
@@ -74,7 +78,7 @@ class Guard:
         """The policy takes over."""
         self.stance = Stance.FREE
         self._begun_us = own.boot_us
-        self._flown = np.array(own.vel_ned[:2])
+        self._flown = self.goes_on_from = np.array(own.vel_ned[:2])
         self._risen_us = NEVER_US
 
     def is_lost(self, own: Own) -> bool:
@@ -102,8 +106,10 @@ class Guard:
             level, down = scale * level, scale * down
             yaw_rate = self._facing_owner(own, yaw_rate)
             self.interventions.note(self.stance.value)
-        level, people = self._past_people(level, own)
-        level = self._flown = self._past_solids(level, own, people)
+        let_be, people = self._past_people(level, own)
+        level = self._flown = self._past_solids(let_be, own, people)
+        taken = let_be - level
+        self.goes_on_from = level + taken * min(1.0, _KEPT_M_S / max(float(np.hypot(*taken)), 1e-6))
         down = self._within_heights(down, own)
         return (float(level[0]), float(level[1]), float(down)), yaw_rate
 

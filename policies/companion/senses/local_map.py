@@ -44,18 +44,31 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """What was known at a time, over the cells of the grid."""
+    """What was known at a time, over the cells of the grid, the southernmost and westernmost first."""
 
-    near_m: Floats
-    """To the middle of the nearest solid cell; farther than ROOM_M is told as that."""
+    near_m: NDArray[np.float32]
+    """From each cell's middle to that of the nearest solid one; farther than ROOM_M is told as that."""
     is_seen: NDArray[np.bool_]
     """Was seen to be free not long ago."""
+    corner: tuple[int, int]
+    """Of the first cell, in cells from the origin."""
 
     def at(self, points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-        """Both of some places; shapes as of the points, without their last axis."""
-        rows, columns = cells_of(points.reshape(-1, 2))
+        """How near the nearest solid cell is [m], between cells too, and whether the cell of a place is seen.
+
+        Args:
+            points: [m] (..., 2), north and east; of who is outside the nearest cell is told.
+
+        Returns:
+            Both, shapes as of the points, without their last axis.
+        """
         shape = points.shape[:-1]
-        return self.near_m[rows, columns].reshape(shape), self.is_seen[rows, columns].reshape(shape)
+        lines = points.reshape(*((1, 1, *shape)[-2:]), 2)  # OpenCV takes no longer line than 32,767
+        at = np.clip(lines / CELL_M - self.corner, 0.0, CELLS - 1)
+        rows, columns = np.moveaxis(at.astype(np.int64), -1, 0)
+        north, east = np.ascontiguousarray(np.moveaxis(at - 0.5, -1, 0), np.float32)
+        near_m = cv2.remap(self.near_m, east, north, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return near_m.astype(np.float64).reshape(shape), self.is_seen[rows, columns].reshape(shape)
 
 
 class LocalMap:
@@ -227,9 +240,9 @@ class LocalMap:
         is_open = (self._solid_us <= now_us - _SOLID_US) | (self._solid_us < self._free_us)
         first = [-(line % CELLS) for line in self._corner]  # to where its sides do not meet
         unrolled = np.roll(is_open, first, (0, 1)).astype(np.uint8)
-        near = CELL_M * cv2.distanceTransform(unrolled, cv2.DIST_L2, cv2.DIST_MASK_PRECISE).astype(np.float64)
-        near = np.roll(np.minimum(near, ROOM_M), [-by for by in first], (0, 1))
-        return Clearance(near, self._free_us > then)
+        near_m = CELL_M * cv2.distanceTransform(unrolled, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        is_seen = np.roll(self._free_us > then, first, (0, 1))
+        return Clearance(np.minimum(near_m, ROOM_M), is_seen, self._corner)
 
     def nearest_m(self, pos_ned: Vector, yaw_rad: float, now_us: int) -> Floats:
         """How near anything known to be solid is in each of SECTORS sectors from the heading clockwise [m]."""

@@ -40,6 +40,7 @@ _STRANGE_S = 4.0  # and after so long anybody may be them
 _NEW_US = 1_000_000  # after so long with somebody in sight they are the owner, if nobody was so before
 _IN_A_ROW = 4  # as many images must show them, one beside the other
 _BESIDE_M = 1.0
+_LOW_M = 1.0  # nearer to the ground, as on take-off, the map would take that for solid
 
 
 class Senses:
@@ -112,6 +113,8 @@ class Senses:
             sight = _sight(seen, pose)
             place = sight.place_ned
             self.seen.see(sight, pose)
+        if own.range_m < _LOW_M:
+            return
         owner_then = self._owner_then(image.time_us, own)
         if by_colours is None:
             self.map.see(image.pixels[..., 3], pose, owner_then, own.boot_us)

@@ -203,8 +203,10 @@ class Following:
     def setpoint(self, action: Floats, own: Own) -> Velocity:
         if self._tracked is not None:
             wanted = self.wanted = self._tracked.setpoint(action, own)
-            allowed = self._guarded(wanted, own)
-            self._tracked.flown(*allowed)
+            (north, east, down), yaw_rate = allowed = self._guarded(wanted, own)
+            if self.guard is not None:
+                north, east = (float(each) for each in self.guard.goes_on_from)
+            self._tracked.flown((north, east, down), yaw_rate)
             return allowed
         if self._observer is None:
             raise RuntimeError("somebody has to make a setpoint of an action")

@@ -15,8 +15,8 @@ from policies.tasks.follow_me.tracked.owner_filter import std_along
 wp.set_module_options({"enable_backward": False})
 
 OWNER_M = 1.15  # [m] to the middle of the person: it comes no nearer
-OWNER_BRAKE_M_S2 = 3.5  # with which the vehicle is taken to brake before them; measured on the x500: 3.0 to 3.5
-REACTION_S = 0.35  # from a setpoint to the motion, besides the age of the picture; measured on the x500
+OWNER_BRAKE_M_S2 = 3.7  # with which the vehicle is taken to brake before them; measured by bench.follow.braking
+REACTION_S = 0.25  # from a setpoint to the motion, besides the age of the picture; likewise, and a decision later
 ESCAPE_CLIMB_M_S = 2.5  # nearer than allowed, until it is over their head
 OVER_M = wp.constant(1.45)  # so far above their chest it is
 _OVER_GAIN = wp.constant(2.0)  # [1/s]
@@ -24,6 +24,7 @@ _LATE_S = wp.constant(0.15)  # with older pictures than this
 _HIGH_M = wp.constant(1.0)  # it stays so far above the chest of who is near, from where it is soon over their head
 _HIGH_WITHIN_M = wp.constant(4.0)
 _RISE_M_S = wp.constant(0.8)
+_CLIMBS_S = wp.constant(0.35)  # who comes is climbed over sooner, by the way that they go in so long; guess
 SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
 _TURNS_M_S2 = wp.constant(2.5)  # how fast a person stops, turns and sets off; guess
 _UNTOLD_S = wp.constant(1.0)  # who was not seen for longer may be anywhere: nothing is reckoned from farther back
@@ -121,9 +122,12 @@ def kept_off(velocity: wp.vec2, way: wp.vec2, most: float) -> wp.vec2:
 
 
 @wp.func
-def sinking_max(k: KeepOff, over_m: float, then_m: float, age_s: float) -> float:
-    """How fast it may sink [m/s], so far above their chest and so near, seen so long ago; negative: it has to climb."""
-    if then_m < k.owner_m:
+def sinking_max(k: KeepOff, over_m: float, then_m: float, coming: float, age_s: float) -> float:
+    """How fast it may sink [m/s]; negative: it has to climb.
+
+    So far above their chest [m], and so near [m] by when it answers; they come at it [m/s]; seen so long ago [s].
+    """
+    if then_m < k.owner_m + _CLIMBS_S * wp.max(coming, 0.0):
         return wp.max(_OVER_GAIN * (over_m - OVER_M), -k.escape_climb)
     if then_m < _HIGH_WITHIN_M and age_s > _LATE_S:
         return wp.max(_OVER_GAIN * (over_m - _HIGH_M), -_RISE_M_S)
@@ -147,7 +151,8 @@ def bounds(
     b = Bounds()
     b.closing_max = closing_max(k, way, own_vel, other_vel, vel_std, age_s, over_m)
     b.then_m = distance_then(way, own_vel, other_vel, k.reaction_s, age_s)
-    b.sinking_max = sinking_max(k, over_m, b.then_m, age_s)
+    coming = -wp.dot(other_vel, way) / wp.max(wp.length(way), 1.0e-3)
+    b.sinking_max = sinking_max(k, over_m, b.then_m, coming, age_s)
     return b
 
 

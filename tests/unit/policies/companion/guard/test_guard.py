@@ -104,6 +104,18 @@ def test_an_owner_who_runs_is_no_obstacle_in_late_images(scene: tuple[Guard, Own
     assert (room_m > 0.5).all()
 
 
+def test_what_things_take_off_a_velocity_the_next_may_go_on_from_but_not_what_people_take(
+    scene: tuple[Guard, Own, Sees], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    guard, own, _ = scene
+    monkeypatch.setattr(Guard, "_past_people", lambda *_: (np.array([2.0, 0.0]), []))
+    monkeypatch.setattr(Guard, "_past_solids", lambda *_: np.array([0.0, 1.0]))
+    flown(guard, own, 1.0)
+    from_flown = guard.goes_on_from - (0.0, 1.0)
+    assert float(np.hypot(*from_flown)) == pytest.approx(1.5)
+    assert from_flown == pytest.approx(1.5 * np.array([2.0, -1.0]) / np.hypot(2.0, 1.0))
+
+
 @pytest.mark.parametrize("wanted_down", [-2.0, 2.0])
 def test_a_policy_that_wants_up_or_down_stays_between_the_heights(
     scene: tuple[Guard, Own, Sees], wanted_down: float

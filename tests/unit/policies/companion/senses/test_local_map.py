@@ -137,3 +137,17 @@ def test_what_hangs_over_a_place_is_remembered_for_whoever_asks_for_longer() -> 
     assert seen.room_up_m(there, 60_000_000) == float("inf")
     assert seen.room_up_m(there, 60_000_000, 600_000_000) < 2.0
     assert seen.room_up_m(HERE, 60_000_000, 600_000_000) == float("inf")
+
+
+def test_how_near_something_is_changes_by_no_more_than_one_moves() -> None:
+    """Not by steps of a cell: a way of half a cell would be as near as it or not at all."""
+    seen = LocalMap()
+    seen.see(picture(2.0), POSE, None, 0)
+    clearance, steps = seen.clearance(HERE, 0), np.arange(0.8, 2.2, 0.01)
+    near_m, _ = clearance.at(np.array(HERE[:2]) + steps[:, None] * np.array(NORTH))
+    assert near_m.min() < 0.15
+    assert near_m.max() > 0.8
+    assert np.abs(np.diff(near_m)).max() < 0.02
+    alone, is_seen = clearance.at(np.array(HERE[:2]) + steps[70] * np.array(NORTH))
+    assert float(alone) == pytest.approx(near_m[70], abs=1e-5)
+    assert is_seen.shape == ()

@@ -26,11 +26,12 @@ class Scene:
         self.phone = Owner()
         self.own = Own(boot_us=0, pos_ned=(0.0, 0.0, -1.6), vel_ned=(0.0, 0.0, 0.0), range_m=1.6)
 
-    def look(self, *places: tuple[float, float], times: int = 1) -> None:
+    def look(self, *places: tuple[float, float], times: int = 1, byte: int = 200) -> None:
+        """What is not somebody is all as far off as a byte of the depth channel says: beyond the map, if not given."""
         self.shows.places = places
         for _ in range(times):
             self.own.boot_us += 100_000
-            pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 200, np.uint8)
+            pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), byte, np.uint8)
             frame = ImageFrame(self.own.boot_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
             self.senses.sense(self.own, self.phone, frame)
 
@@ -132,3 +133,13 @@ def test_the_phone_finds_the_owner_again_where_others_were() -> None:
         scene.look((3.0, 0.0), (6.0, 4.0), times=5)
     assert scene.silence_s == 0.0
     assert scene.senses.seen.now(scene.own.boot_us)[0][:2] == pytest.approx([3.0, 0.0], abs=0.3)
+
+
+def test_the_ground_seen_on_take_off_is_nothing_solid(scene: Scene) -> None:
+    scene.own.range_m, scene.own.pos_ned = 0.3, (0.0, 0.0, -0.3)
+    scene.look(byte=80)
+    around = scene.senses.map
+    assert np.isinf(around.nearest_m(scene.own.pos_ned, 0.0, scene.own.boot_us)).all()
+    scene.own.range_m, scene.own.pos_ned = 1.6, (0.0, 0.0, -1.6)
+    scene.look(byte=80)
+    assert np.isfinite(around.nearest_m(scene.own.pos_ned, 0.0, scene.own.boot_us)).any()

@@ -129,16 +129,22 @@ def test_over_their_head_the_level_distance_does_not_count() -> None:
 
 
 def test_nearer_than_allowed_it_climbs_until_it_is_over_them() -> None:
-    assert float(sinking_max(RULE, 0.3, 0.5, 0.2)) < -1.0
-    assert float(sinking_max(RULE, 1.45, 0.5, 0.2)) == pytest.approx(0.0, abs=1e-6)
+    assert float(sinking_max(RULE, 0.3, 0.5, 0.0, 0.2)) < -1.0
+    assert float(sinking_max(RULE, 1.45, 0.5, 0.0, 0.2)) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_who_comes_is_climbed_over_sooner_than_who_stands_or_goes() -> None:
+    assert float(sinking_max(RULE, 0.3, 1.6, 2.0, 0.1)) < -1.0
+    assert float(sinking_max(RULE, 0.3, 1.6, 0.0, 0.1)) > 1.0
+    assert float(sinking_max(RULE, 0.3, 1.6, -2.0, 0.1)) > 1.0
 
 
 def test_with_late_pictures_it_stays_over_the_chest_of_who_is_near_from_where_it_is_soon_over_their_head() -> None:
-    assert float(sinking_max(RULE, 0.3, 2.0, 0.2)) < -0.5
-    assert float(sinking_max(RULE, 1.0, 2.0, 0.2)) == pytest.approx(0.0, abs=1e-6)
-    assert float(sinking_max(RULE, 2.0, 2.0, 0.2)) > 1.0
-    assert float(sinking_max(RULE, 0.3, 5.0, 0.2)) > 10.0
-    assert float(sinking_max(RULE, 0.3, 2.0, 0.1)) > 10.0
+    assert float(sinking_max(RULE, 0.3, 2.0, 0.0, 0.2)) < -0.5
+    assert float(sinking_max(RULE, 1.0, 2.0, 0.0, 0.2)) == pytest.approx(0.0, abs=1e-6)
+    assert float(sinking_max(RULE, 2.0, 2.0, 0.0, 0.2)) > 1.0
+    assert float(sinking_max(RULE, 0.3, 5.0, 0.0, 0.2)) > 10.0
+    assert float(sinking_max(RULE, 0.3, 2.0, 0.0, 0.1)) > 10.0
 
 
 def test_what_it_takes_off_is_only_what_brings_it_nearer() -> None:

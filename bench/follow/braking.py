@@ -1,0 +1,96 @@
+"""`python -m bench.follow.braking`: the way that a vehicle needs to a stand, and what the guard's rule takes it to be.
+
+A pilot that asks for a speed and then for none, back and forth, over MAVLink in open country and wind. The way counts
+from the decision that asks for none. The rule has to allow for a decision more: who stops may do so right after one.
+"""
+
+from itertools import product
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from mission.flight_config import FlightConfig, OwnerConfig
+from mission.follow.follow_scoring import FollowWatch
+from mission.follow.lockstep import flight_with_companion, follow_for
+from policies.companion.guard.settings import GuardSettings
+from policies.experts.follower import Floats, ScriptedFollower
+from policies.tasks.flight.own_state import ACTIONS
+from policies.tasks.follow_me.observe import DECISION_S
+from policies.tasks.follow_me.tracked.keep_off import OWNER_BRAKE_M_S2, REACTION_S
+from policies.tasks.follow_me.world import FOLLOW_WORLD
+
+SEED = 3_930_001  # odd, as of all tests
+LEG, STAND = 40, 25  # decisions at the speed, and at none
+_TURNS = 4  # how often it stops
+_STANDS_M_S = 0.15  # beside what wind and noise do
+
+
+class Stopper(ScriptedFollower):
+    """Asks for a speed north, for none, for the same south, for none, and so on.
+
+    Args:
+        speed: [m/s].
+    """
+
+    def __init__(self, speed: float) -> None:
+        super().__init__()
+        self._part = speed / ACTIONS[0].scale
+        self.decisions = 0
+
+    def act(self, vector: Floats, image: NDArray[np.uint8]) -> Floats:
+        """The same whatever it is told, but for the height, which it keeps."""
+        down = super().act(vector, image)[2]
+        self.owner_hfrd = (3.0, 0.0, 0.0)  # so that it is let fly on
+        turn, k = divmod(self.decisions, LEG + STAND)
+        self.decisions += 1
+        ahead = self._part * (-1.0) ** turn if k < LEG else 0.0
+        return np.array([ahead, 0.0, down, 0.0], np.float32)
+
+
+def stopping_m(airframe: str, speed: float, wind_m_s: float) -> Floats:
+    """The way [m] to each stand but the first, while it comes to speed: (stands,)."""
+    world = FOLLOW_WORLD.model_copy(update={"trees_per_ha": 0.0, "seed": SEED})
+    config = FlightConfig(airframe=airframe, owner=OwnerConfig(pace="walk"), world=world, seed=SEED, wind_m_s=wind_m_s)
+    pilot = Stopper(speed)
+    flight, companion = flight_with_companion(config, pilot, guard=GuardSettings(is_on=False))
+    truth = flight.rig.rows["truth"][0]
+    rows: list[tuple[int, float, float, float]] = []
+
+    def look(_: FollowWatch) -> None:
+        north, east = (float(x) for x in truth["pos_ned"][:2])
+        rows.append((pilot.decisions, north, east, float(np.hypot(*truth["vel_ned"][:2]))))
+
+    follow_for(flight, companion, (_TURNS + 1) * (LEG + STAND) * DECISION_S, look)
+    seen = np.array(rows)
+    asked, place, speeds = seen[:, 0] - 1, seen[:, 1:3], seen[:, 3]
+    ways = []
+    for turn in range(1, _TURNS):
+        first = int(np.argmax(asked == turn * (LEG + STAND) + LEG))
+        stands = first + int(np.argmax(speeds[first:] < _STANDS_M_S))
+        ways.append(float(np.hypot(*(place[stands] - place[first]))))
+    return np.array(ways, np.float32)
+
+
+def rule_m(speed: float) -> float:
+    """What the guard takes it to be [m], with a decision more."""
+    return speed * REACTION_S + 0.5 * speed * speed / OWNER_BRAKE_M_S2
+
+
+def main() -> None:
+    """Prints the table."""
+    table = Table("airframe", "wind [m/s]", "speed [m/s]", "to a stand [m]", "and a decision more", "the rule")
+    cases = list(product(("x500", "f450", "f550"), (0.0, 8.0), (2.0, 4.0, 6.0)))
+    for airframe, wind_m_s, speed in track(cases, "braking", transient=True):
+        way_m = float(stopping_m(airframe, speed, wind_m_s).max())
+        more_m = way_m + speed * float(DECISION_S)
+        figures = (wind_m_s, speed, way_m, more_m, rule_m(speed))
+        table.add_row(airframe, *(f"{figure:.3g}" for figure in figures))
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    typer.run(main)
