@@ -98,7 +98,7 @@ class GuardSettings(BaseModel):
     """From a setpoint to the motion, besides the age of the picture; measured."""
     hears_s: float = Field(default=0.15, ge=0.0, le=1.0)
     """The part of that in which nothing is seen of a new velocity; the rest is lag. Before what does not move."""
-    solid_m: float = Field(default=0.6, gt=0.0, le=SOLID_MAX_M)
+    solid_m: float = Field(default=0.7, gt=0.0, le=SOLID_MAX_M)
     """From the vehicle's middle to that of a solid cell of the map: it reaches to 0.4 m, half a cell to 0.18 m."""
     unseen_speed: float = Field(default=0.6, ge=0.0, le=20.0)
     """[m/s] to where nothing is known."""
