@@ -249,7 +249,8 @@ def export(
 ) -> None:
     """Export a dataset for the tools of others."""
     with _refusing():
-        from policies.datasets.exporting import export_d4rl, export_lerobot
+        from policies.datasets.exporting import export_d4rl
+        from policies.datasets.exporting_lerobot import export_lerobot
 
         try:
             steps = export_d4rl(dataset, output) if to == "d4rl" else export_lerobot(dataset, output)

@@ -34,7 +34,7 @@ PLACES = {
         *("policies/mono_depth", "policies/person_detector", "mission/benchmark/any_pilot.py"),
         *("mission/train", "mission/video/rtp_video.py", "mission/video/video_file.py"),
     ),
-    "lerobot": ("policies/datasets/exporting.py",),
+    "lerobot": ("policies/datasets/exporting_lerobot.py",),
     "test": ("mission/pytest_plugin",),
     "ray": ("mission/campaign/workers/ray_cluster.py", "mission/dataset/ray_collectors.py"),
     "dev": ("tests",),

@@ -1,6 +1,10 @@
 """Datasets whose observations are a vector and an image: as the environment shows them, and edited whole."""
 
+import json
+from dataclasses import replace
+
 import gymnasium
+import h5py
 import numpy as np
 import pytest
 from minari import MinariDataset
@@ -114,8 +118,24 @@ def test_an_episode_with_an_image_too_few_is_refused():
         EpisodeRows(whole.observations, whole.actions, whole.rewards, True, "lost", whole.images[:-1])
 
 
-def test_observations_with_images_are_not_exported(tmp_path):
-    folder = written(tmp_path / "set")
-    with pytest.raises(DatasetError, match="set: observations with images are not exported"):
-        export_d4rl(folder, tmp_path / "out.hdf5")
-    assert [path.name for path in tmp_path.iterdir()] == ["set"]
+def test_d4rl_has_an_image_beside_each_observation_and_those_after_the_last_steps(tmp_path):
+    assert export_d4rl(written(tmp_path / "set"), tmp_path / "flat.hdf5") == sum(range(5, 11))
+    expected = [episode(5 + seed, seed) for seed in range(6)]
+    with h5py.File(tmp_path / "flat.hdf5") as file:
+        columns = {name: rows[()] for name, rows in file.items()}
+        assert json.loads(file.attrs["layout"])["image"]["channels"] == list(PIXELS.channels)
+    assert columns["images"].dtype == np.uint8
+    assert np.array_equal(columns["images"], np.concatenate([each.images[:-1] for each in expected]))
+    assert np.array_equal(columns["observations"], np.concatenate([each.observations[:-1] for each in expected]))
+    following = np.roll(columns["images"], -1, axis=0)  # as the docs tell to find that of `next_observations`
+    following[columns["terminals"] | columns["timeouts"]] = columns["final_images"]
+    assert np.array_equal(following, np.concatenate([each.images[1:] for each in expected]))
+
+
+def test_d4rl_has_no_images_of_those_beside_a_vector(tmp_path):
+    layout = replace(LAYOUT, image=None)
+    with DatasetWriter(tmp_path / "set", DatasetOrigin(layout, {}, "test")) as writer:
+        writer.add(episode())
+    export_d4rl(tmp_path / "set", tmp_path / "flat.hdf5")
+    with h5py.File(tmp_path / "flat.hdf5") as file:
+        assert not {"images", "final_images"} & set(file)
