@@ -142,8 +142,7 @@ def _checked_range(range_m: float, depth: NDArray[np.uint8], row: int, column: i
     returns = byte[byte < _NO_RETURN]
     if len(returns) < STRIDE:
         return range_m
-    steps = (np.array([first_row, first_column]) + 0.5 * STRIDE - 0.5 * depth.shape[0]) * (2.0 / depth.shape[0])
-    shown_m = depth_of(returns) * sqrt(1.0 + float((steps * _HALF_WIDTH) @ (steps * _HALF_WIDTH)))
+    shown_m = depth_of(returns) * _ray_m((first_column + 0.5 * STRIDE, first_row + 0.5 * STRIDE), depth.shape[1])
     off = np.log(shown_m / range_m)
     agrees = (off > _AGREES[0]) & (off < _AGREES[1])
     return float(shown_m[agrees].min()) if agrees.any() else None
@@ -173,12 +172,17 @@ def _on_body(depth: NDArray[np.uint8], range_m: float, at: tuple[float, float]) 
     columns = slice(max(column - _BODY_PX[0], 0), column + _BODY_PX[0])
     rows = slice(max(row - _BODY_PX[1], 0), row + _BODY_PX[1])
     shown_m = _shown_m(depth[rows, columns])
-    is_body = np.abs(np.log(shown_m / range_m)) < _SAME_BODY
+    is_body = np.abs(np.log(shown_m / (range_m / _ray_m(at, depth.shape[1])))) < _SAME_BODY
     if is_body.sum() < STRIDE:
         return at, range_m
     aside = columns.start + 0.5 + float(np.nonzero(is_body)[1].mean())
-    steps = (np.array([aside, at[1]]) - 0.5 * depth.shape[0]) * (2.0 * _HALF_WIDTH / depth.shape[0])
-    return (aside, at[1]), float(np.median(shown_m[is_body])) * sqrt(1.0 + float(steps @ steps))
+    return (aside, at[1]), float(np.median(shown_m[is_body])) * _ray_m((aside, at[1]), depth.shape[1])
+
+
+def _ray_m(at: tuple[float, float], width: int) -> float:
+    """How long the ray of a pixel is, of depth 1 along the optical axis."""
+    steps = (np.array(at) - 0.5 * width) * (2.0 * _HALF_WIDTH / width)
+    return sqrt(1.0 + float(steps @ steps))
 
 
 def _chest_hfrd(at: tuple[float, float], range_m: float, width: int, down_frd: tuple[float, float]) -> Vector:
@@ -199,8 +203,7 @@ def _chest_colours(pixels: NDArray[np.uint8], at: tuple[float, float], range_m: 
     aside, up, down = (max(m * per_m, 1.0) for m in _CHEST_M)
     columns = slice(max(round(at[0] - aside), 0), round(at[0] + aside))
     rows = slice(max(round(at[1] - up), 0), round(at[1] + down))
-    steps = (np.array(at) - 0.5 * width) * (2.0 * _HALF_WIDTH / width)
-    skin_m = (range_m - _HALF_BODY_M) / sqrt(1.0 + float(steps @ steps))
+    skin_m = (range_m - _HALF_BODY_M) / _ray_m(at, width)
     is_body = np.abs(np.log(_shown_m(pixels[rows, columns, 3]) / skin_m)) < _SAME_BODY
     chest = pixels[rows, columns, :3][is_body]
     if len(chest) == 0:
