@@ -6,16 +6,21 @@ import pytest
 from common.image_stream import ImageFrame
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import Own, Owner
-from policies.person_detector.detector import SURE, Detection, PersonDetector
+from policies.person_detector.detector import STRIDE, SURE, Detection, PersonDetector
 from policies.person_detector.scenes import scenes
 from policies.person_detector.training import is_sure
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, TILT_DEG
 
 
 @pytest.fixture(scope="module")
-def judged():
+def there():
+    return scenes(1024, 11, is_test=True)
+
+
+@pytest.fixture(scope="module")
+def judged(there):
     """Of pictures with somebody, and of pictures of nobody, whether it is sure of somebody."""
-    there, detector = scenes(1024, 11, is_test=True), PersonDetector()
+    detector = PersonDetector()
     return tuple(is_sure(detector, there.images[rows]) for rows in (there.has_person, there.is_empty))
 
 
@@ -29,6 +34,24 @@ def test_it_sees_who_is_there(judged):
     seen, _ = judged
     assert len(seen) > 400
     assert seen.mean() > 0.88  # 92.2 % of 3,700
+
+
+def test_its_ranges_by_depth_hold_in_the_middle_of_an_image_and_at_its_edge(there):
+    """Who is cut off by the edge, before a vehicle that leans, must not be thought farther off than they are."""
+    detector, from_middle, ratios = PersonDetector(), [], []
+    for k in np.flatnonzero(there.has_person):
+        cells = np.argwhere(there.cells[k] == 1)
+        for found in detector.find(there.images[k], (0.0, 0.0)):
+            off = np.abs(cells - (np.array(found.pixel[::-1]) / STRIDE - 0.5)).max(1)
+            row, column = cells[off.argmin()]
+            if found.probability >= SURE and found.has_depth and off.min() < 1.5:
+                from_middle.append(max(abs(row - 7.5), abs(column - 7.5)))
+                ratios.append(np.linalg.norm(found.chest_hfrd) / there.ranges_m[k, row, column])
+    for is_meant in (np.array(from_middle) < 5.0, np.array(from_middle) > 5.0):
+        of_these = np.array(ratios)[is_meant]
+        assert len(of_these) > 150
+        assert 0.85 < np.quantile(of_these, 0.05) < np.quantile(of_these, 0.95) < 1.15
+        assert (of_these > 1.2).mean() < 0.02
 
 
 @pytest.mark.parametrize(("probability", "is_seen"), [(SURE - 0.01, False), (SURE + 0.01, True)])
