@@ -45,7 +45,7 @@ class TrackedRecorder:
 
         Args:
             own: telemetry.
-            flown: what was asked for after it, from which the next goes on.
+            flown: what was asked for after it.
             time_us: the companion's own clock.
             image_age_s: since the newest image was taken.
             seen: what the policy was shown; None: it is shown something else.

@@ -15,7 +15,7 @@ from policies.datasets.decisions import DecisionRows, Rows, TruthRows, struck_on
 from policies.datasets.follow_me_rows import action_rows, follow_rows, sight_rows
 from policies.datasets.goal_rows import navigate_action_rows
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS
-from policies.tasks.flight.own_state import Command
+from policies.tasks.flight.own_state import ACTIONS, Command
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.owner_visibility import ROOM_MAX_M, Sight
 from policies.tasks.follow_me.tracked.vector import REACH_M, SECTORS, TRACKED_ELEMENTS
@@ -49,8 +49,7 @@ class FollowMeJudge:
         """The pilot's, or where a guard or another flew what leads there; clipped to [-1, 1]."""
         n = len(run)
         flown = command_rows_of(run.flown)
-        last = np.empty_like(flown)
-        last[1:] = flown[:-1]
+        last = command_rows_of(self._gone_on_from(run))
         last["vel_ned"][0] = (*run.vel_ned[0, :2], 0.0)
         last["yaw_rate"][0] = 0.0
         out = wp.zeros(n, dtype=wp.vec4)
@@ -59,6 +58,14 @@ class FollowMeJudge:
         wp.launch(action_rows, n, [*inputs, out])
         found: Rows = out.numpy()
         return found
+
+    def _gone_on_from(self, run: DecisionRows) -> Rows:
+        """As each frame tells it: what was flown last, or beside trunks what the guard let the pilot go on from."""
+        names = ("last_forward_sp", "last_right_sp", "last_down_sp", "last_yaw_rate_sp")
+        most = np.array([element.scale for element in ACTIONS])
+        forward, right, down, yaw_rate = (run.frame[:, [self._at[name] for name in names]] * most).T
+        cos, sin = np.cos(run.yaw), np.sin(run.yaw)
+        return np.stack([cos * forward - sin * right, sin * forward + cos * right, down, yaw_rate], -1)
 
     def judged(self, run: DecisionRows, actions: Rows, truth: TruthRows | None) -> tuple[Rows, Rows]:
         steps = len(run) - 1

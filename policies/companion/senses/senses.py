@@ -41,7 +41,7 @@ _NEW_US = 1_000_000  # after so long with somebody in sight they are the owner, 
 _IN_A_ROW = 4  # as many images must show them, one beside the other
 _BESIDE_M = 1.0
 _RISEN_M = 1.0  # until it is so high the map would take the ground for solid,
-_DOWN_M = 0.3  # and again once it is as low as this
+_DOWN_M = 0.6  # and again once it is as low as this, before the ground comes into the slice that it flies through
 
 
 class Senses:
@@ -66,7 +66,7 @@ class Senses:
         self._boot_us = 0
         self._poses = PoseHistory()
         self.map = LocalMap()
-        self._is_up = False
+        self._is_up = True  # until a range says otherwise
         self.seen = SeenOwner()
         self.seen_us: int | None = None
         """When the newest image with the owner was taken, on the vehicle's clock."""
@@ -115,7 +115,8 @@ class Senses:
             sight = _sight(seen, pose)
             place = sight.place_ned
             self.seen.see(sight, pose)
-        self._is_up = not own.range_m < (_DOWN_M if self._is_up else _RISEN_M)
+        if isfinite(own.range_m):
+            self._is_up = own.range_m > (_DOWN_M if self._is_up else _RISEN_M)
         if not self._is_up:
             return
         owner_then = self._owner_then(image.time_us, own)

@@ -143,3 +143,9 @@ def test_the_ground_seen_on_take_off_is_nothing_solid(scene: Scene) -> None:
     scene.own.range_m, scene.own.pos_ned = 1.6, (0.0, 0.0, -1.6)
     scene.look(byte=80)
     assert np.isfinite(around.nearest_m(scene.own.pos_ned, 0.0, scene.own.boot_us)).any()
+
+
+def test_without_a_range_finder_images_are_taken_in(scene: Scene) -> None:
+    scene.own.range_m = float("nan")
+    scene.look(byte=80)
+    assert np.isfinite(scene.senses.map.nearest_m(scene.own.pos_ned, 0.0, scene.own.boot_us)).any()
