@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from bench.row import require
 from mission.flight_config import FlightConfig, OwnerConfig
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.lockstep import flight_with_companion, follow_for
@@ -30,7 +31,7 @@ _STANDS_M_S = 0.15  # beside what wind and noise do
 
 
 class Stopper(ScriptedFollower):
-    """Asks for a speed north, for none, for the same south, for none, and so on.
+    """Asks for a speed ahead, for none, for the same backwards, for none, and so on.
 
     Args:
         speed: [m/s].
@@ -69,8 +70,12 @@ def stopping_m(airframe: str, speed: float, wind_m_s: float) -> Floats:
     asked, place, speeds = seen[:, 0] - 1, seen[:, 1:3], seen[:, 3]
     ways = []
     for turn in range(1, _TURNS):
-        first = int(np.argmax(asked == turn * (LEG + STAND) + LEG))
-        stands = first + int(np.argmax(speeds[first:] < _STANDS_M_S))
+        is_asked = (asked >= turn * (LEG + STAND) + LEG) & (asked < (turn + 1) * (LEG + STAND))
+        first = int(np.argmax(is_asked))
+        require(bool(abs(speeds[first] - speed) < 0.1 * speed), f"{airframe}: came to {speeds[first]:.1f} m/s")
+        is_standing = is_asked & (speeds < _STANDS_M_S)
+        require(bool(is_standing.any()), f"{airframe}: never stood after {speed:g} m/s")
+        stands = int(np.argmax(is_standing))
         ways.append(float(np.hypot(*(place[stands] - place[first]))))
     return np.array(ways, np.float32)
 
