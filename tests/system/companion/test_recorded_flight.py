@@ -16,6 +16,7 @@ from mission.flight_config import FlightConfig, OwnerConfig
 from mission.follow.lockstep import flight_with_companion, follow_for
 from policies.companion.decision_log import GUARD_KEY, TOPIC
 from policies.companion.guard.interventions import REASONS
+from policies.companion.guard.settings import guard_settings
 from policies.companion.skills.following import Following
 from policies.companion.skills.load_skill import load_follower
 from policies.datasets.episodes import DatasetError
@@ -47,7 +48,8 @@ def flown(folder, name, *, is_recorded=True):
     folder.mkdir()
     pilot = Witness(load_follower(name))
     config = FlightConfig(owner=OwnerConfig(pace="walk"), world=FOLLOW_WORLD, seed=3, wind_m_s=2.0)
-    flight, companion = flight_with_companion(config, pilot, folder=folder)
+    careful = guard_settings({"owner_m": 2.5})  # so that it has something to change
+    flight, companion = flight_with_companion(config, pilot, folder=folder, guard=careful)
     if is_recorded:
         from mission.view.replay_file import keep_for_replay
 

@@ -37,7 +37,8 @@ def test_the_section_takes_the_place_of_the_one_that_is_there(tmp_path, monkeypa
     assert "| hover, expert | TD3+BC | 95.0 | 3 | 72.0 ± 2.0 | 81.0 ± 1.7 | -9.0 (-13.2 to -4.8) | 3.1 |" in text
     words = " ".join(text.split())
     assert "in 1 of 3 rows: 1 of 1 with IQL and 0 of 2 with TD3+BC. By the 95 % interval" in words
-    assert "1 of the others are within noise, 1 of the others are below it, 0 of all are above it. 1 rows are" in words
+    assert "1 of the others are within noise, 1 of the others are below it, 0 of all are above it. Over all" in words
+    assert " 1 rows are of one seed" in words
     assert "by at most 1e-06 of the way that they have gone" in words
     assert "IQL's policy by 0.008:" in words
     assert max(map(len, text.splitlines())) < 125

@@ -192,6 +192,6 @@ def test_full_speed_into_the_trees_is_stopped_before_them_by_the_guard(monkeypat
     advance(flight, 1.0)
     advance(flight, 20.0, lambda: companion.phase is not Phase.FLYING)
     advance(flight, 0.5)
-    assert "Companion: hold: goto reached" in flight.drone.texts  # led round all of them
+    assert float(flight.rig.rows["truth"][0]["pos_ned"][0]) > 75.0  # led round all of them, to the goal or past it
     assert companion.skill.guard.interventions["near something"] > 50
     assert float(flight.rig.rows["truth"][0]["impact_speed"]) == 0.0
