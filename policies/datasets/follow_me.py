@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from common.warp_start import start_warp
 from policies.datasets.decisions import DecisionRows, Rows, TruthRows, struck_on_the_way
-from policies.datasets.follow_me_rows import action_rows, follow_rows, sight_rows
+from policies.datasets.follow_me_rows import action_rows, command_rows, follow_rows, sight_rows
 from policies.datasets.goal_rows import navigate_action_rows
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS
 from policies.tasks.flight.own_state import ACTIONS, Command
@@ -47,25 +47,19 @@ class FollowMeJudge:
 
     def actions(self, run: DecisionRows) -> Rows:
         """The pilot's, or where a guard or another flew what leads there; clipped to [-1, 1]."""
-        n = len(run)
-        flown = command_rows_of(run.flown)
-        last = command_rows_of(self._gone_on_from(run))
+        n, q = len(run), wp.array(quats(run.yaw), dtype=wp.quat)
+        shown = np.ascontiguousarray(run.frame[:, [self._at[f"last_{element.name}"] for element in ACTIONS]])
+        gone_on_from = wp.zeros(n, dtype=Command)  # as flown last, or beside trunks what the guard let it go on from
+        wp.launch(command_rows, n, [wp.array(shown, dtype=wp.vec4), q, gone_on_from])
+        last = gone_on_from.numpy()
         last["vel_ned"][0] = (*run.vel_ned[0, :2], 0.0)
         last["yaw_rate"][0] = 0.0
         out = wp.zeros(n, dtype=wp.vec4)
         asked = wp.array(run.action.astype(np.float32), dtype=wp.vec4)
-        inputs = [asked, wp.array(quats(run.yaw), dtype=wp.quat), *(wp.array(a, dtype=Command) for a in (last, flown))]
-        wp.launch(action_rows, n, [*inputs, out])
+        flown = wp.array(command_rows_of(run.flown), dtype=Command)
+        wp.launch(action_rows, n, [asked, q, wp.array(last, dtype=Command), flown, out])
         found: Rows = out.numpy()
         return found
-
-    def _gone_on_from(self, run: DecisionRows) -> Rows:
-        """As each frame tells it: what was flown last, or beside trunks what the guard let the pilot go on from."""
-        names = ("last_forward_sp", "last_right_sp", "last_down_sp", "last_yaw_rate_sp")
-        most = np.array([element.scale for element in ACTIONS])
-        forward, right, down, yaw_rate = (run.frame[:, [self._at[name] for name in names]] * most).T
-        cos, sin = np.cos(run.yaw), np.sin(run.yaw)
-        return np.stack([cos * forward - sin * right, sin * forward + cos * right, down, yaw_rate], -1)
 
     def judged(self, run: DecisionRows, actions: Rows, truth: TruthRows | None) -> tuple[Rows, Rows]:
         steps = len(run) - 1

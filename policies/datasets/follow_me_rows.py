@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from policies.tasks.flight.own_state import Command
+from policies.tasks.flight.own_state import Command, action_command
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.owner_visibility import Sight, see
 from policies.tasks.follow_me.reward import follow_outcome, follow_reward
@@ -79,6 +79,15 @@ def said_command(last: Command, flown: Command) -> Command:
     out.vel_ned = last.vel_ned + step * (said / wp.max(size, 1.0e-9))
     out.yaw_rate = last.yaw_rate + (flown.yaw_rate - last.yaw_rate) / APPROACH
     return out
+
+
+@wp.kernel(enable_backward=False)
+def command_rows(
+    fractions: wp.array(dtype=wp.vec4), q_ned_from_frd: wp.array(dtype=wp.quat), out: wp.array(dtype=Command)
+) -> None:
+    """The command that a frame tells as fractions, of every row."""
+    i = wp.tid()
+    out[i] = action_command(fractions[i], q_ned_from_frd[i])
 
 
 @wp.kernel(enable_backward=False)
