@@ -57,18 +57,20 @@ class Clearance:
         """How near the nearest solid cell is [m], between cells too, and whether the cell of a place is seen.
 
         Args:
-            points: [m] (..., 2), north and east; of who is outside the nearest cell is told.
+            points: [m] (..., 2), north and east; outside nothing is seen, and how near is the nearest cell's.
 
         Returns:
             Both, shapes as of the points, without their last axis.
         """
         shape = points.shape[:-1]
         lines = points.reshape(*((1, 1, *shape)[-2:]), 2)  # OpenCV takes no longer line than 32,767
-        at = np.clip(lines / CELL_M - self.corner, 0.0, CELLS - 1)
+        at = lines / CELL_M - self.corner
+        is_inside = ((at >= 0.0) & (at < CELLS)).all(-1)
+        at = np.clip(at, 0.0, CELLS - 1)
         rows, columns = np.moveaxis(at.astype(np.int64), -1, 0)
         north, east = np.ascontiguousarray(np.moveaxis(at - 0.5, -1, 0), np.float32)
         near_m = cv2.remap(self.near_m, east, north, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        return near_m.astype(np.float64).reshape(shape), self.is_seen[rows, columns].reshape(shape)
+        return near_m.astype(np.float64).reshape(shape), (is_inside & self.is_seen[rows, columns]).reshape(shape)
 
 
 class LocalMap:

@@ -151,3 +151,14 @@ def test_how_near_something_is_changes_by_no_more_than_one_moves() -> None:
     alone, is_seen = clearance.at(np.array(HERE[:2]) + steps[70] * np.array(NORTH))
     assert float(alone) == pytest.approx(near_m[70], abs=1e-5)
     assert is_seen.shape == ()
+
+
+def test_what_is_outside_the_grid_is_not_seen() -> None:
+    seen, looks_south = LocalMap(), (0.0, 0.0, 1.0, 0.0)
+    for k in range(12):  # backwards to the north: behind it all is seen to be free, to the edge of the grid
+        here = (HERE[0] + k, HERE[1], HERE[2])
+        seen.see(picture(40.0), Pose(0, here, looks_south), None, 100_000 * k)
+    far_m = np.arange(0.0, 40.0, 0.5)
+    _, is_seen = seen.clearance(here, 1_100_000).at(np.array(here[:2]) + far_m[:, None] * np.array(SOUTH))
+    assert is_seen[far_m < 11.0].all()
+    assert not is_seen[far_m > 13.0].any()
