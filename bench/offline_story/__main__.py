@@ -147,12 +147,12 @@ class Telling:
             "hyperparameters": hyperparameters,
             "offline": {
                 "dataset": [str(path) for path in self._datasets(mix)],
-                "evaluation_interval": max(steps // (20 if self.story.keeps_best else 5), 1),
+                "evaluation_interval": max(steps // self.story.evaluations, 1),
                 "evaluation_episodes": 64,
             },
             "network_settings": {"normalize": True, "hidden_units": 128, "num_layers": 2},
             "reward_signals": {"extrinsic": {"gamma": self.story.gamma}},
-            "keep_best": self.story.keeps_best,
+            "keep_best": True,
             "max_steps": steps,
             "summary_freq": max(steps // 20, 1),
         }

@@ -9,10 +9,10 @@ import torch
 
 from policies.learn.checkpoint import checkpoints, load
 from policies.learn.config.run import TorchSettings
-from policies.learn.export.policy_file import CHECKPOINT
+from policies.learn.export.policy_file import CHECKPOINT, load_policy
 from policies.learn.trainer import train
 from policies.learn.training_run_folder import RunError
-from tests.unit.policies.offline.test_training import KINDS, StopAfter, config, same
+from tests.unit.policies.offline.test_training import BEST, EVERY_200, KINDS, StopAfter, config, same
 
 
 def by(processes, *given, **settings):
@@ -63,6 +63,16 @@ def test_two_processes_learn_what_one_does(tmp_path, roller_ball, kind):
     # Five steps of Adam at 3e-4 move a weight by up to 1.5e-3; sums in another order differ in the last bits.
     assert greatest_difference(one["policy"], two["policy"]) < 2e-5
     assert greatest_difference(one["networks"], two["networks"]) < 1e-4
+
+
+@pytest.mark.slow
+def test_of_two_processes_as_well_the_policy_that_returned_most_is_kept(tmp_path, roller_ball):
+    watcher = StopAfter()
+    result = train(by(2, tmp_path, roller_ball, BEST, offline=EVERY_200), watcher)
+    returns = {each.steps: each.mean_reward for each in watcher.shown if each.steps % 200 == 0}
+    _, card = load_policy(result.policy)
+    assert set(returns) == {200, 400, 600}
+    assert card.figures["training_reward"] == max(returns.values()) == returns[card.steps]
 
 
 @pytest.mark.slow
