@@ -74,6 +74,10 @@ class GuardSettings(BaseModel):
     """... and than this where others were met: from farther away clothes cannot be told apart."""
     search_round_speed: float = Field(default=1.5, ge=0.0, le=20.0)
     """[m/s] round it, where nobody is seen there."""
+    search_ahead_speed: float = Field(default=2.0, ge=0.0, le=20.0)
+    """[m/s] without a phone, on the way to where they went ..."""
+    search_ahead_s: float = Field(default=5.0, ge=0.0, le=LONG_S)
+    """... for so long; then it turns on the spot."""
     search_height_m: float = Field(default=2.6, gt=0.0, le=100.0)
     """Above the ground, where it waits and searches: over people, under crowns ..."""
     search_among_height_m: float = Field(default=2.9, gt=0.0, le=100.0)

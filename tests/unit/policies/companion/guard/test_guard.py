@@ -164,6 +164,23 @@ def test_a_search_looks_then_goes_round_then_turns_wherever_it_came_from(scene: 
     assert len(turns) > 50
 
 
+def test_an_owner_whom_nobody_hears_is_searched_on_the_way_to_where_they_went_then_on_the_spot(
+    scene: tuple[Guard, Own, Sees],
+) -> None:
+    guard, own, sees = scene
+    flown(guard, own, 1.0)
+    sees.is_there = False
+    own.pos_ned, own.range_m = (0.0, 0.0, -2.9), 2.9  # as high as it waits, over people
+    s = guard.settings
+    assert max(np.abs(flown(guard, own, s.search_s)[25:])) < 1e-6  # it stands before it searches
+    ahead = flown(guard, own, s.search_ahead_s)[2:-2]
+    assert min(ahead) > 0.5 * s.search_ahead_speed
+    assert max(ahead) < s.search_ahead_speed + 1e-6
+    assert guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[1] == s.search_yaw_rate
+    assert max(np.abs(flown(guard, own, 10.0)[5:])) < 1e-6
+    assert guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[1] == s.search_yaw_rate
+
+
 @pytest.mark.parametrize(("height_m", "is_in_the_way"), [(1.6, True), (2.9, False)])
 def test_a_search_passes_over_the_heads_of_people_but_not_through_them(
     scene: tuple[Guard, Own, Sees], monkeypatch: pytest.MonkeyPatch, height_m: float, is_in_the_way: bool
