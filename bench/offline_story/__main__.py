@@ -26,7 +26,7 @@ from policies.learn.export.policy_path import find_policy
 TRAINERS: dict[str, dict[str, Any]] = {
     "bc": {},
     "bc-best": {"best_fraction": 0.34},
-    "iql": {"expectile": 0.8},
+    "iql": {},
     "td3_bc": {"alpha": 2.5},
 }
 MIXES = {"": ("clumsy", "shipped"), "medium-": ("clumsy",)}
@@ -133,7 +133,7 @@ class Telling:
                 continue
             recipe = self.folder / f"{name}.yaml"
             if trainer == "iql":
-                given["inverse_temperature"] = self.story.inverse_temperature
+                given |= self.story.iql
             behavior = self._behavior(mix, trainer.split("-")[0], given)
             told = {"behaviors": {self.story.task: behavior}, **self._environment()}
             write_whole(recipe, json.dumps(told, indent=1).encode())
