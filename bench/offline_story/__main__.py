@@ -159,7 +159,8 @@ class Telling:
 
     def _environment(self) -> dict[str, Any]:
         settings = {"env_path": self.story.task, "env_args": list(self.story.env_args), "num_areas": 64}
-        return {"environment_parameters": dict(self.story.numbers or {}), "env_settings": settings}
+        numbers = {**(self.story.numbers or {}), **self.story.evaluated()}
+        return {"environment_parameters": numbers, "env_settings": settings}
 
     def _datasets(self, mix: str) -> list[Path]:
         return [self.folder / "datasets" / name for name in MIXES[mix]]

@@ -40,6 +40,8 @@ class Conditions:
 
 
 _NUMBERS = {**_AS_FLOWN, "lost_m": _NEVER, "unseen_limit_s": _NEVER}
+RUNNING = {**_NUMBERS, "trees_per_ha": TREES_PER_HA[1], "owner_speed_max": OWNER_SPEEDS["run"]}
+"""Of the evaluations of a training."""
 TRAINING = Conditions("train", TREES_PER_HA, 24, _NUMBERS)
 FLOWN = Conditions("test", TREES_PER_HA, 72, _NUMBERS)
 

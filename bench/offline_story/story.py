@@ -74,6 +74,8 @@ class Story:
     titles: tuple[str, str] = ("flights", "policy that ships")
     numbers: Mapping[str, float] | None = None
     """What rewards weigh; None: as the task does."""
+    evaluated: Callable[[], Mapping[str, float]] = dict
+    """Numbers of a training's evaluations besides; where there are none, in the conditions that policies train in."""
 
     @property
     def pilot_titles(self) -> dict[str, str]:
@@ -90,6 +92,12 @@ def _judge_following(policies: Mapping[str, Path], split: Split) -> Judged:
     from bench.offline_story.batch import FLOWN, TRAINING, judged
 
     return judged(policies, TRAINING if split == "train" else FLOWN, FOLLOW_NUMBERS)
+
+
+def _behind_runners() -> Mapping[str, float]:
+    from bench.offline_story.batch import RUNNING
+
+    return RUNNING
 
 
 def _judge_parking(policies: Mapping[str, Path], split: Split) -> Judged:
@@ -119,6 +127,7 @@ STORIES = {
         forecast_steps=5000,
         env_args=("observation=tracked", "has_estimator=false", "owner=any", "terrain=kept", "stack=3"),
         numbers=FOLLOW_NUMBERS,
+        evaluated=_behind_runners,
         gamma=0.97,
         iql={"expectile": 0.99, "inverse_temperature": 20.0},  # hundredths are paid for being nearer
         seeds={"flown": 3_936_001},
