@@ -122,7 +122,7 @@ STORIES = {
         task="FollowMe",
         benchmark="follow",
         pilots={"clumsy": "bench.offline_story.pilots:Clumsy", "shipped": "follow-me-tracked"},
-        sizes={"clumsy": 48, "shipped": 24, "flown": 24},
+        sizes={"clumsy": 48, "shipped": 24, "flown": 12},
         steps=20_000,
         forecast_steps=5000,
         env_args=("observation=tracked", "has_estimator=false", "owner=any", "terrain=kept", "stack=3"),

@@ -35,7 +35,8 @@ _SEARCH_PERIOD_S = 24.0  # of a search towards the phone: at first it looks ther
 _SEARCH_FACES_S = 4.0  # then there from other sides, since trees may hide who is there,
 _SEARCH_ROUNDS_S = 13.0  # and then round itself
 _THERE_M = 2.0  # so near the stand-off it looks round
-_GOES_ON_S = 4.0  # the owner, whom nobody hears, went on for about so long as they were last seen to
+_GOES_ON_S = 4.0  # an owner whom nobody hears is looked for where they would be in so long; guess
+_SHORT_OF_M = 2.0  # and no nearer to there than this; guess
 _RISEN_US = 2_000_000  # for so long it stays over the owner
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 _KEPT_M_S = 1.5  # so much of what things take off a velocity the next decision may go on from
@@ -74,14 +75,13 @@ class Guard:
         self._sinking_max = 0.0  # [m/s] of who is too near
         self._risen_us = NEVER_US  # when it rose over the owner last
         self._there_us = 0  # when a search came to where the phone says
-        self._ahead = np.zeros(2)  # level, where an owner went whom nobody hears; none: nobody knows
+        self._search_us = 0  # when it began to search
 
     def begin(self, own: Own) -> None:
         """The policy takes over."""
         self.stance = Stance.FREE
         self._begun_us = own.boot_us
         self._flown = self.goes_on_from = np.array(own.vel_ned[:2])
-        self._ahead = np.zeros(2)
         self._risen_us = NEVER_US
 
     def is_lost(self, own: Own) -> bool:
@@ -99,6 +99,8 @@ class Guard:
         age_s = max(own.boot_us - self.senses.image_us, 0) * 1e-6
         silence_s = self.senses.silence_s(own)
         self.stance = self._stance(silence_s, age_s)
+        if self.stance is not Stance.SEARCH:
+            self._search_us = own.boot_us
         level = np.array(velocity[:2])
         down = velocity[2]
         if self.stance in (Stance.SEARCH, Stance.STOP):
@@ -133,10 +135,10 @@ class Guard:
         return self.senses.is_heard and self.senses.has_met_others
 
     def _searched(self, own: Own, is_searching: bool) -> tuple[Floats, float, float]:
-        """Up, out of people's way; towards the phone, no nearer than a stand-off, and round it; without one it turns
-        on the way to where they went, and then on the spot.
+        """Up, out of people's way; towards the phone, no nearer than a stand-off, and round it.
 
-        With one it turns on the spot too now and then: the phone may be wrong.
+        Without one it turns, first on its flight to where they may be, then on the spot; with one now and then too: the
+        phone may be wrong.
         """
         s, among = self.settings, self._is_among_others
         height_m = s.search_among_height_m if among else s.search_height_m
@@ -161,18 +163,21 @@ class Guard:
             if phase_s < _SEARCH_ROUNDS_S:
                 return level + s.search_round_speed * np.array([-way[1], way[0]]) / far_m, down, yaw_rate
             return level, down, s.search_yaw_rate
-        if not is_searching and self.senses.seen.sights:
-            self._ahead = self._where_they_went(own)
-            return np.zeros(2), down, self._facing((*(np.array(own.pos_ned[:2]) + self._ahead), 0.0), own)
-        is_under_way = self._alone_s(own) < s.search_s + s.search_ahead_s
-        return s.search_ahead_speed * is_under_way * self._ahead, down, s.search_yaw_rate
+        if not self.senses.seen.sights:
+            return np.zeros(2), down, s.search_yaw_rate
+        if not is_searching:
+            return np.zeros(2), down, self._facing(self.senses.seen.now(own.boot_us)[0], own)  # where they were going
+        off = self._likely_place() - np.array(own.pos_ned[:2])
+        far_m = float(np.hypot(*off))
+        speed = min(stopping_speed(far_m - _SHORT_OF_M, s.reaction_s, 1.0), s.search_ahead_speed)
+        is_under_way = own.boot_us - self._search_us < s.search_ahead_s * 1e6
+        return is_under_way * speed * off / max(far_m, 1e-6), down, s.search_yaw_rate
 
-    def _where_they_went(self, own: Own) -> Floats:
-        """The level direction to where the owner is by now, if they went on as they were last seen to."""
+    def _likely_place(self) -> Floats:
+        """Where an owner whom nobody hears is looked for [m], north and east: as they were last seen to go."""
         seen = self.senses.seen
         place, velocity = seen.now(seen.time_us)
-        way = place[:2] + _GOES_ON_S * velocity[:2] - np.array(own.pos_ned[:2])
-        return np.asarray(way / max(float(np.hypot(*way)), 1e-6))
+        return np.asarray(place[:2] + _GOES_ON_S * velocity[:2])
 
     def _facing_owner(self, own: Own, yaw_rate: float) -> float:
         """Towards where sights and phone put an owner who is not seen; a yaw rate if nobody knows."""

@@ -57,7 +57,7 @@ class GuardSettings(BaseModel):
     stop_s: float = Field(default=STOP_S, gt=0.0, le=LONG_S)
     """... until it stands."""
     search_s: float = Field(default=5.0, gt=0.0, le=LONG_S)
-    """After so long it searches: towards the phone, if that is heard; otherwise it turns round where it is."""
+    """After so long it searches: towards the phone, if that is heard; otherwise to where they went."""
     search_among_s: float = Field(default=2.5, gt=0.0, le=LONG_S)
     """The same where others were met not long ago and the phone is heard: the owner goes on, behind one of them."""
     lost_s: float = Field(default=60.0, gt=0.0, le=LONG_S)
@@ -75,15 +75,15 @@ class GuardSettings(BaseModel):
     search_round_speed: float = Field(default=1.5, ge=0.0, le=20.0)
     """[m/s] round it, where nobody is seen there."""
     search_ahead_speed: float = Field(default=2.0, ge=0.0, le=20.0)
-    """[m/s] without a phone, on the way to where they went ..."""
+    """[m/s] at most, without a phone, to 2 m short of where the owner would be 4 s after the last sight; guess ..."""
     search_ahead_s: float = Field(default=5.0, ge=0.0, le=LONG_S)
-    """... for so long; then it turns on the spot."""
+    """... and for so long at most; then it stays. It turns all the time; guess."""
     search_height_m: float = Field(default=2.6, gt=0.0, le=100.0)
     """Above the ground, where it waits and searches: over people, under crowns ..."""
     search_among_height_m: float = Field(default=2.9, gt=0.0, le=100.0)
     """... and where others were met: so far over their heads that they are no obstacle."""
     search_yaw_rate: float = Field(default=1.2, gt=0.0, le=3.0)
-    """[rad/s] on the spot."""
+    """[rad/s] to look all round."""
     image_slow_s: float = Field(default=0.55, gt=0.0, le=IMAGES_S)
     """From this age of the picture on it becomes slower ..."""
     image_stop_s: float = Field(default=0.8, gt=0.0, le=IMAGES_S)

@@ -14,12 +14,12 @@ from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE,
 
 
 class Sees:
-    """A detector that sees somebody three metres ahead, or nobody."""
+    """A detector that sees somebody, three metres ahead at first, or nobody."""
 
-    is_there = True
+    is_there, ahead_m, aside_m, below_m = True, 3.0, 0.0, 0.6
 
     def find(self, pixels: object, down_frd: object) -> list[Detection]:  # noqa: ARG002
-        return [Detection(0.99, (3.0, 0.0, 0.6), (32.0, 32.0))] if self.is_there else []
+        return [Detection(0.99, (self.ahead_m, self.aside_m, self.below_m), (32.0, 32.0))] if self.is_there else []
 
 
 def flown(guard: Guard, own: Own, seconds: float) -> list[float]:
@@ -164,21 +164,54 @@ def test_a_search_looks_then_goes_round_then_turns_wherever_it_came_from(scene: 
     assert len(turns) > 50
 
 
-def test_an_owner_whom_nobody_hears_is_searched_on_the_way_to_where_they_went_then_on_the_spot(
+@pytest.mark.parametrize(("ahead_m", "goes_m"), [(3.0, 1.0), (6.0, 4.0)])
+def test_an_owner_whom_nobody_hears_is_searched_short_of_where_they_may_be(
+    scene: tuple[Guard, Own, Sees], ahead_m: float, goes_m: float
+) -> None:
+    guard, own, sees = scene
+    sees.ahead_m = ahead_m
+    flown(guard, own, 1.0)
+    sees.is_there = False
+    s = guard.settings
+    own.pos_ned, own.range_m = (0.0, 0.0, -s.search_height_m), s.search_height_m
+    assert max(np.abs(flown(guard, own, s.search_s)[25:])) < 1e-6  # it stands before it searches
+    speeds = []
+    for _ in range(80):
+        speeds += flown(guard, own, 0.1)
+        own.vel_ned = (speeds[-1], 0.0, 0.0)
+        own.pos_ned = (own.pos_ned[0] + 0.1 * speeds[-1], 0.0, own.pos_ned[2])
+        assert guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[1] == s.search_yaw_rate
+    assert max(speeds) <= s.search_ahead_speed
+    assert own.pos_ned[0] == pytest.approx(goes_m, abs=0.5)
+    assert abs(speeds[-1]) < 0.2
+
+
+def test_a_search_begins_where_the_owner_was_seen_last_whatever_the_last_search_was_for(
     scene: tuple[Guard, Own, Sees],
 ) -> None:
     guard, own, sees = scene
+    own.pos_ned, own.range_m, sees.below_m = (0.0, 0.0, -2.6), 2.6, 1.6
+    for aside_m in (0.0, 4.0):  # without images it does not stand and look before
+        sees.is_there, sees.ahead_m, sees.aside_m = True, 5.0, aside_m
+        flown(guard, own, 3.0)
+        sees.is_there = False
+        for _ in range(50):
+            own.boot_us += 100_000
+            guard.filtered(((0.0, 0.0, 0.0), 0.0), own)
+        flown(guard, own, 0.3)
+        assert guard.stance is Stance.SEARCH
+        north, east, _ = guard.filtered(((0.0, 0.0, 0.0), 0.0), own)[0]
+        assert north > 0.3
+        assert (abs(east) > 0.3 * north) == (aside_m > 0.0)
+
+
+def test_without_time_for_it_a_search_stays_where_it_is(scene: tuple[Guard, Own, Sees]) -> None:
+    _, own, sees = scene
+    guard = Guard(guard_settings({"search_ahead_s": 0.0, "search_s": 1.5}), Senses(detector=sees))  # type: ignore[arg-type]
     flown(guard, own, 1.0)
     sees.is_there = False
-    own.pos_ned, own.range_m = (0.0, 0.0, -2.9), 2.9  # as high as it waits, over people
-    s = guard.settings
-    assert max(np.abs(flown(guard, own, s.search_s)[25:])) < 1e-6  # it stands before it searches
-    ahead = flown(guard, own, s.search_ahead_s)[2:-2]
-    assert min(ahead) > 0.5 * s.search_ahead_speed
-    assert max(ahead) < s.search_ahead_speed + 1e-6
-    assert guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[1] == s.search_yaw_rate
-    assert max(np.abs(flown(guard, own, 10.0)[5:])) < 1e-6
-    assert guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[1] == s.search_yaw_rate
+    own.pos_ned, own.range_m = (0.0, 0.0, -2.6), 2.6
+    assert max(np.abs(flown(guard, own, 8.0)[20:])) < 1e-6
 
 
 @pytest.mark.parametrize(("height_m", "is_in_the_way"), [(1.6, True), (2.9, False)])
