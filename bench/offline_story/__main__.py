@@ -67,7 +67,7 @@ class Telling:
 
     def tell(self) -> None:
         """From logs to the page."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        self._begin()
         self._log()
         self._build()
         for mix in MIXES:
@@ -83,6 +83,17 @@ class Telling:
         if not self.story.recorded:
             sizes["seconds"] = round(SECONDS)
         write_page(self.story, self.folder, Result(forecasts, validated, matched, flown, chosen, sizes))
+
+    def _begin(self) -> None:
+        """A folder holds one story: what was made by other numbers is not gone on with."""
+        s = self.story
+        given = {"sizes": s.sizes, "steps": s.steps, "seeds": s.seeds, "iql": s.iql, "evaluations": s.evaluations}
+        given |= {"numbers": {**(s.numbers or {}), **s.evaluated()}, "env_args": s.env_args}
+        file = self.folder / "given.json"
+        is_older = not file.exists() and (self.folder / "logs").exists()
+        self.folder.mkdir(parents=True, exist_ok=True)
+        if is_older or _once(file, lambda: given) != json.loads(json.dumps(given)):
+            raise SystemExit(f"{self.folder} holds a story of other numbers; take another --folder, or remove it")
 
     def _log(self) -> None:
         """Each pilot's flights; what was begun and not ended is flown anew."""

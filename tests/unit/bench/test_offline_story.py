@@ -99,3 +99,15 @@ def test_a_story_that_there_is_not_is_refused():
     result = CliRunner().invoke(app, ["--story", "hover"])
     assert result.exit_code == 2
     assert "there are follow, park, navigate" in result.output.replace("\n", " ")
+
+
+@pytest.mark.parametrize("kept", ["{}", None])
+def test_a_folder_with_a_story_of_other_numbers_is_not_gone_on_with(tmp_path, kept):
+    (tmp_path / "park" / "logs").mkdir(parents=True)
+    if kept is not None:
+        (tmp_path / "park" / "given.json").write_text(kept)
+    result = CliRunner().invoke(app, ["--story", "park", "--folder", str(tmp_path)])
+    assert result.exit_code == 1
+    assert (
+        "holds a story of other numbers; take another --folder, or remove it" in str(result.exception) + result.output
+    )
