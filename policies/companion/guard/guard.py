@@ -37,6 +37,7 @@ _SEARCH_ROUNDS_S = 13.0  # and then round itself
 _THERE_M = 2.0  # so near the stand-off it looks round
 _GOES_ON_S = 4.0  # an owner whom nobody hears is looked for where they would be in so long; guess
 _SHORT_OF_M = 2.0  # and no nearer to there than this; guess
+_STAYS_M_S = 0.5  # as fast it goes back to where it stays
 _RISEN_US = 2_000_000  # for so long it stays over the owner
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 _KEPT_M_S = 1.5  # so much of what things take off a velocity the next decision may go on from
@@ -75,7 +76,8 @@ class Guard:
         self._sinking_max = 0.0  # [m/s] of who is too near
         self._risen_us = NEVER_US  # when it rose over the owner last
         self._there_us = 0  # when a search came to where the phone says
-        self._search_us = 0  # when it began to search
+        self._search_us = 0  # when it began to search,
+        self._stays_ned: Floats | None = None  # and where it stays in the end
 
     def begin(self, own: Own) -> None:
         """The policy takes over."""
@@ -100,7 +102,7 @@ class Guard:
         silence_s = self.senses.silence_s(own)
         self.stance = self._stance(silence_s, age_s)
         if self.stance is not Stance.SEARCH:
-            self._search_us = own.boot_us
+            self._search_us, self._stays_ned = own.boot_us, None
         level = np.array(velocity[:2])
         down = velocity[2]
         if self.stance in (Stance.SEARCH, Stance.STOP):
@@ -163,15 +165,23 @@ class Guard:
             if phase_s < _SEARCH_ROUNDS_S:
                 return level + s.search_round_speed * np.array([-way[1], way[0]]) / far_m, down, yaw_rate
             return level, down, s.search_yaw_rate
-        if not self.senses.seen.sights:
-            return np.zeros(2), down, s.search_yaw_rate
-        if not is_searching:
+        has_seen = self.senses.seen.sights > 0
+        if has_seen and not is_searching:
             return np.zeros(2), down, self._facing(self.senses.seen.now(own.boot_us)[0], own)  # where they were going
+        if not has_seen or own.boot_us - self._search_us >= s.search_ahead_s * 1e6:
+            return self._staying(own), down, s.search_yaw_rate
         off = self._likely_place() - np.array(own.pos_ned[:2])
         far_m = float(np.hypot(*off))
         speed = min(stopping_speed(far_m - _SHORT_OF_M, s.reaction_s, 1.0), s.search_ahead_speed)
-        is_under_way = own.boot_us - self._search_us < s.search_ahead_s * 1e6
-        return is_under_way * speed * off / max(far_m, 1e-6), down, s.search_yaw_rate
+        return speed * off / max(far_m, 1e-6), down, s.search_yaw_rate
+
+    def _staying(self, own: Own) -> Floats:
+        """The level velocity that keeps it where it was when it was asked first: none at all lets it drift."""
+        here = np.array(own.pos_ned[:2])
+        if self._stays_ned is None:
+            self._stays_ned = here
+        off = self._stays_ned - here
+        return np.asarray(off * min(1.0, _STAYS_M_S / max(float(np.hypot(*off)), 1e-6)))
 
     def _likely_place(self) -> Floats:
         """Where an owner whom nobody hears is looked for [m], north and east: as they were last seen to go."""

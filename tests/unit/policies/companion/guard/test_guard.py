@@ -205,6 +205,19 @@ def test_a_search_begins_where_the_owner_was_seen_last_whatever_the_last_search_
         assert (abs(east) > 0.3 * north) == (aside_m > 0.0)
 
 
+def test_at_the_end_of_a_search_it_does_not_drift(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, sees = scene
+    own.pos_ned, own.range_m, sees.below_m = (0.0, 0.0, -2.6), 2.6, 1.6
+    flown(guard, own, 1.0)
+    sees.is_there = False
+    s = guard.settings
+    flown(guard, own, s.search_s + s.search_ahead_s + 0.5)
+    for _ in range(400):  # what it asks for is flown, and 7 cm/s besides
+        speed = flown(guard, own, 0.1)[0]
+        own.pos_ned = (own.pos_ned[0] + 0.1 * (speed + 0.07), 0.0, -2.6)
+    assert abs(own.pos_ned[0]) < 0.2
+
+
 def test_without_time_for_it_a_search_stays_where_it_is(scene: tuple[Guard, Own, Sees]) -> None:
     _, own, sees = scene
     guard = Guard(guard_settings({"search_ahead_s": 0.0, "search_s": 1.5}), Senses(detector=sees))  # type: ignore[arg-type]
