@@ -75,7 +75,7 @@ def section_lines(story: Story, result: Result, figures: Mapping[str, Figures]) 
         "",
         f"![{story.measures[0].title[0].upper()}{story.measures[0].title[1:]}](images/{_image(story).name})",
         "",
-        "Success in batch while they learn, in 64 episodes of the conditions of training, and where the policies of "
+        "Success in batch while they learn, in 64 episodes each time, and where the policies of "
         f"all {words[0]} leave them:",
         "",
         f"![Training curves](images/{_image(story, '-curves').name})",
