@@ -88,7 +88,7 @@ class Telling:
         """A folder holds one story: what was made by other numbers is not gone on with."""
         s = self.story
         given = {"sizes": s.sizes, "steps": s.steps, "seeds": s.seeds, "iql": s.iql, "evaluations": s.evaluations}
-        given |= {"numbers": {**(s.numbers or {}), **s.evaluated()}, "env_args": s.env_args}
+        given |= self._environment()
         file = self.folder / "given.json"
         is_older = not file.exists() and (self.folder / "logs").exists()
         self.folder.mkdir(parents=True, exist_ok=True)
