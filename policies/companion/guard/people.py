@@ -66,7 +66,7 @@ class PeopleRule:
             passes_over: it keeps its height: whoever is far enough below does not count.
         """
         here, count = np.array(own.pos_ned[:2]), min(len(people), MOST)
-        self._asked[0] = (level, own.vel_ned[:2], count, passes_over)
+        self._asked[0] = (level, own.vel_ned, count, passes_over)
         for row, known in zip(self._people, people, strict=False):
             silence_s, over_m = min(known.silence_s, _SILENCE_MAX_S), float(known.pos_ned[2]) - own.pos_ned[2]
             row["way"], row["vel"], row["vel_var"] = known.pos_ned[:2] - here, known.vel, known.vel_var

@@ -23,9 +23,8 @@ def guarded(command: Command, own: OwnState, owner: OwnerFilter, k: KeepOff) -> 
     scale = wp.clamp((_STOP_S - owner.age_s) / (_STOP_S - _SLOW_S), 0.0, 1.0)
     place = place_now(owner)
     way = wp.vec2(place[0] - own.pos_ned[0], place[1] - own.pos_ned[1])
-    own_vel = wp.vec2(own.vel_ned[0], own.vel_ned[1])
     over_m = place[2] - own.pos_ned[2]
-    b = bounds(k, way, own_vel, velocity_now(owner), std_along(owner.both.vel_var, way), owner.age_s, over_m)
+    b = bounds(k, way, own.vel_ned, velocity_now(owner), std_along(owner.both.vel_var, way), owner.age_s, over_m)
     level = kept_off(scale * wp.vec2(command.vel_ned[0], command.vel_ned[1]), way, b.closing_max)
     command.vel_ned = wp.vec3(level[0], level[1], wp.min(scale * command.vel_ned[2], b.sinking_max))
     return command

@@ -145,14 +145,16 @@ class Bounds:
 
 @wp.func
 def bounds(
-    k: KeepOff, way: wp.vec2, own_vel: wp.vec2, other_vel: wp.vec2, vel_std: float, age_s: float, over_m: float
+    k: KeepOff, way: wp.vec2, own_vel: wp.vec3, other_vel: wp.vec2, vel_std: float, age_s: float, over_m: float
 ) -> Bounds:
-    """All of the rule, of who was seen so long ago; as `closing_max` is asked."""
+    """All of the rule, of who was seen so long ago; as `closing_max` is asked, with a velocity in ned."""
     b = Bounds()
-    b.closing_max = closing_max(k, way, own_vel, other_vel, vel_std, age_s, over_m)
-    b.then_m = distance_then(way, own_vel, other_vel, k.reaction_s, age_s)
+    level = wp.vec2(own_vel[0], own_vel[1])
+    over_then_m = over_m - k.reaction_s * wp.max(own_vel[2], 0.0)  # height that it loses is none to go by
+    b.closing_max = closing_max(k, way, level, other_vel, vel_std, age_s, over_then_m)
+    b.then_m = distance_then(way, level, other_vel, k.reaction_s, age_s)
     coming = -wp.dot(other_vel, way) / wp.max(wp.length(way), 1.0e-3)
-    b.sinking_max = sinking_max(k, over_m, b.then_m, coming, age_s)
+    b.sinking_max = sinking_max(k, over_then_m, b.then_m, coming, age_s)
     return b
 
 
@@ -172,7 +174,7 @@ class Asked:
     """What one vehicle wants, near so many."""
 
     level: wp.vec2  # [m/s]
-    own_vel: wp.vec2  # [m/s]
+    own_vel: wp.vec3  # [m/s], ned
     people: int
     passes_over: wp.bool  # it keeps its height, and who is far enough below is in nobody's way
 
