@@ -203,12 +203,13 @@ class Telling:
         from mission.dataset.judge import draw
         from policies.offline.evaluation.datasets import judged
 
-        path = coverage_image(self.story)
+        path = self.folder / "coverage.png"
         if not path.exists():
             files = {str(file): name for name, file in self._policies("").items()}
             datasets = [str(dataset) for dataset in self._datasets("")]
             found = judged(datasets, list(files), None, {"steps": 1})  # no return is asked for
             draw([replace(each, name=files[each.name]) for each in found], path)
+        shutil.copyfile(path, coverage_image(self.story))
 
     def _match(self, chosen: Mapping[str, str]) -> dict[str, Any]:
         """How those that fly, and the policy that ships, do in batch in conditions like those they will meet."""
