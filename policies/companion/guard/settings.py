@@ -91,7 +91,8 @@ class GuardSettings(BaseModel):
     owner_m: float = Field(default=OWNER_M, gt=0.0, le=20.0)
     """To the middle of the owner: it comes no nearer."""
     pressed_m: float = Field(default=2.0, gt=0.0, le=20.0)
-    """Nearer than this it may go back to where it has not looked; nearer than `owner_m` it climbs too, until above."""
+    """Nearer than this it may go back to where it has not looked. It climbs, until above, nearer than `owner_m` and as
+    much as they still come nearer while it brakes, or in a third of a second."""
     escape_climb: float = Field(default=ESCAPE_CLIMB_M_S, ge=0.0, le=20.0)
     """[m/s] upwards, nearer to somebody than it may be."""
     owner_brake: float = Field(default=OWNER_BRAKE_M_S2, ge=0.5, le=20.0)

@@ -25,6 +25,7 @@ _HIGH_M = wp.constant(1.0)  # it stays so far above the chest of who is near, fr
 _HIGH_WITHIN_M = wp.constant(4.0)
 _RISE_M_S = wp.constant(0.8)
 SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
+_CLIMBS_S = wp.constant(0.35)  # who comes is climbed over by the way that they go in so long at the latest; guess
 _TURNS_M_S2 = wp.constant(2.5)  # how fast a person stops, turns and sets off; guess
 _UNTOLD_S = wp.constant(1.0)  # who was not seen for longer may be anywhere: nothing is reckoned from farther back
 _REPORTED_S = wp.constant(0.25)  # from the first picture of who sets off until their velocity tells it; measured,
@@ -121,14 +122,17 @@ def kept_off(velocity: wp.vec2, way: wp.vec2, most: float) -> wp.vec2:
 
 
 @wp.func
-def sinking_max(k: KeepOff, over_m: float, then_m: float, closing: float, age_s: float) -> float:
-    """How fast it may sink [m/s]; negative: it has to climb. Who can be given way to no more is climbed over.
+def sinking_max(k: KeepOff, over_m: float, then_m: float, closing: float, coming: float, age_s: float) -> float:
+    """How fast it may sink [m/s]; negative: it has to climb, over who can be given way to no more.
 
-    So far above their chest [m], and so near [m] by when it answers; they come nearer to each other [m/s], which it
-    takes a way to end; seen so long ago [s].
+    That is who is within the way by which they come nearer until it goes as fast as they do, braking as it is taken to;
+    or, since trees may end its way back, within what they go in a third of a second.
+
+    So far above their chest [m], without what it has lost by then, and so near [m] by when it answers; they come nearer
+    to each other, and come at it [m/s]; seen so long ago [s].
     """
-    closing = wp.max(closing, 0.0)
-    if then_m < k.owner_m + 0.5 * closing * closing / k.brake:
+    nearing, coming = wp.max(closing, 0.0), wp.max(coming, 0.0)
+    if then_m < k.owner_m + wp.max(0.5 * nearing * nearing / k.brake, _CLIMBS_S * coming):
         return wp.max(_OVER_GAIN * (over_m - OVER_M), -k.escape_climb)
     if then_m < _HIGH_WITHIN_M and age_s > _LATE_S:
         return wp.max(_OVER_GAIN * (over_m - _HIGH_M), -_RISE_M_S)
@@ -154,8 +158,9 @@ def bounds(
     over_then_m = over_m - k.reaction_s * wp.max(own_vel[2], 0.0)  # height that it loses is none to go by
     b.closing_max = closing_max(k, way, level, other_vel, vel_std, age_s, over_then_m)
     b.then_m = distance_then(way, level, other_vel, k.reaction_s, age_s)
-    closing = wp.dot(level - other_vel, way) / wp.max(wp.length(way), 1.0e-3)
-    b.sinking_max = sinking_max(k, over_then_m, b.then_m, closing, age_s)
+    unit = way / wp.max(wp.length(way), 1.0e-3)
+    closing, coming = wp.dot(level - other_vel, unit), -wp.dot(other_vel, unit)
+    b.sinking_max = sinking_max(k, over_then_m, b.then_m, closing, coming, age_s)
     return b
 
 

@@ -8,6 +8,7 @@ from policies.tasks.follow_me.tracked.keep_off import (
     OWNER_BRAKE_M_S2,
     OWNER_M,
     REACTION_S,
+    bounds,
     closing_max,
     distance_then,
     keep_off,
@@ -128,23 +129,44 @@ def test_over_their_head_the_level_distance_does_not_count() -> None:
     assert most(1.2, over_m=1.2) > most(1.2)
 
 
+def sinks(far_m: float, own: tuple[float, float, float], other: float, over_m: float = 0.3) -> float:
+    """How fast a vehicle may sink [m/s] near somebody in a direction between the axes; velocities along the way."""
+    along, aside = np.array([0.6, -0.8]), np.array([0.8, 0.6])
+    level = own[0] * along + own[1] * aside
+    own_vel, other_vel = wp.vec3(*level, own[2]), wp.vec2(*(other * along))
+    return float(bounds(RULE, wp.vec2(*(far_m * along)), own_vel, other_vel, 0.0, 0.1, over_m).sinking_max)
+
+
 def test_nearer_than_allowed_it_climbs_until_it_is_over_them() -> None:
-    assert float(sinking_max(RULE, 0.3, 0.5, 0.0, 0.2)) < -1.0
-    assert float(sinking_max(RULE, 1.45, 0.5, 0.0, 0.2)) == pytest.approx(0.0, abs=1e-6)
+    assert sinks(0.5, (0.0, 0.0, 0.0), 0.0) == pytest.approx(-2.3)
+    assert sinks(0.5, (0.0, 0.0, 0.0), 0.0, over_m=1.45) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_who_comes_is_climbed_over_sooner_than_who_stands_or_goes() -> None:
-    assert float(sinking_max(RULE, 0.3, 1.6, 2.0, 0.1)) < -1.0
-    assert float(sinking_max(RULE, 0.3, 1.6, 0.0, 0.1)) > 1.0
-    assert float(sinking_max(RULE, 0.3, 1.6, -2.0, 0.1)) > 1.0
+def test_who_can_be_given_way_to_no_more_is_climbed_over() -> None:
+    assert sinks(2.5, (3.0, 0.0, 0.0), 0.0) == pytest.approx(-2.3)  # too fast at somebody who stands
+    assert sinks(2.5, (0.0, 0.0, 0.0), -3.0) == pytest.approx(-2.3)  # they at it
+    assert sinks(2.5, (1.0, 0.0, 0.0), 0.0) > 1.0  # it can brake
+    assert sinks(2.0, (3.0, 0.0, 0.0), 3.0) > 1.0  # behind who runs away as fast
+    assert sinks(2.5, (0.0, 3.0, 0.0), 0.0) > 1.0  # past them
+
+
+def test_who_comes_is_climbed_over_in_time_even_if_it_goes_back_as_fast_as_they_come() -> None:
+    """A trunk may end its way back."""
+    assert sinks(2.2, (-4.0, 0.0, 0.0), -4.0) == pytest.approx(-2.3)
+    assert sinks(1.6, (0.0, 0.0, 0.0), -2.0) < -1.0 < 1.0 < sinks(1.6, (0.0, 0.0, 0.0), 0.0)
+
+
+def test_height_that_it_is_losing_is_none_to_go_by() -> None:
+    assert sinks(1.0, (0.0, 0.0, 1.0), 0.0, over_m=1.3) == pytest.approx(2.0 * (1.3 - REACTION_S - 1.45))
+    assert sinks(1.0, (0.0, 0.0, -1.0), 0.0, over_m=1.3) == pytest.approx(2.0 * (1.3 - 1.45))
 
 
 def test_with_late_pictures_it_stays_over_the_chest_of_who_is_near_from_where_it_is_soon_over_their_head() -> None:
-    assert float(sinking_max(RULE, 0.3, 2.0, 0.0, 0.2)) < -0.5
-    assert float(sinking_max(RULE, 1.0, 2.0, 0.0, 0.2)) == pytest.approx(0.0, abs=1e-6)
-    assert float(sinking_max(RULE, 2.0, 2.0, 0.0, 0.2)) > 1.0
-    assert float(sinking_max(RULE, 0.3, 5.0, 0.0, 0.2)) > 10.0
-    assert float(sinking_max(RULE, 0.3, 2.0, 0.0, 0.1)) > 10.0
+    assert float(sinking_max(RULE, 0.3, 2.0, 0.0, 0.0, 0.2)) < -0.5
+    assert float(sinking_max(RULE, 1.0, 2.0, 0.0, 0.0, 0.2)) == pytest.approx(0.0, abs=1e-6)
+    assert float(sinking_max(RULE, 2.0, 2.0, 0.0, 0.0, 0.2)) > 1.0
+    assert float(sinking_max(RULE, 0.3, 5.0, 0.0, 0.0, 0.2)) > 10.0
+    assert float(sinking_max(RULE, 0.3, 2.0, 0.0, 0.0, 0.1)) > 10.0
 
 
 def test_what_it_takes_off_is_only_what_brings_it_nearer() -> None:
