@@ -155,8 +155,7 @@ class Guard:
                 self._there_us = own.boot_us
                 return np.zeros(2), down, yaw_rate
             stand_off_m = s.search_among_m if among else s.search_stand_off_m
-            speed = min(stopping_speed(far_m - stand_off_m, s.reaction_s, 1.0), s.search_speed)
-            level = speed * way / far_m
+            level = self._approaching(way, stand_off_m, s.search_speed)
             if far_m > stand_off_m + _THERE_M:
                 self._there_us = own.boot_us
             phase_s = max(own.boot_us - self._there_us, 0) * 1e-6 % _SEARCH_PERIOD_S
@@ -170,10 +169,14 @@ class Guard:
             return np.zeros(2), down, self._facing(self.senses.seen.now(own.boot_us)[0], own)  # where they were going
         if not has_seen or own.boot_us - self._search_us >= s.search_ahead_s * 1e6:
             return self._staying(own), down, s.search_yaw_rate
-        off = self._likely_place() - np.array(own.pos_ned[:2])
-        far_m = float(np.hypot(*off))
-        speed = min(stopping_speed(far_m - _SHORT_OF_M, s.reaction_s, 1.0), s.search_ahead_speed)
-        return speed * off / max(far_m, 1e-6), down, s.search_yaw_rate
+        way = self._likely_place() - np.array(own.pos_ned[:2])
+        return self._approaching(way, _SHORT_OF_M, s.search_ahead_speed), down, s.search_yaw_rate
+
+    def _approaching(self, way: Floats, short_of_m: float, speed_max: float) -> Floats:
+        """The level velocity along a way that ends in a stand, so far short of its end."""
+        far_m = float(np.hypot(*way))
+        speed = min(stopping_speed(far_m - short_of_m, self.settings.reaction_s, 1.0), speed_max)
+        return np.asarray(speed * way / max(far_m, 1e-6))
 
     def _staying(self, own: Own) -> Floats:
         """The level velocity that keeps it where it was when it was asked first: none at all lets it drift."""

@@ -24,8 +24,8 @@ _LATE_S = wp.constant(0.15)  # with older pictures than this
 _HIGH_M = wp.constant(1.0)  # it stays so far above the chest of who is near, from where it is soon over their head
 _HIGH_WITHIN_M = wp.constant(4.0)
 _RISE_M_S = wp.constant(0.8)
-SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
 _CLIMBS_S = wp.constant(0.35)  # who comes is climbed over by the way that they go in so long at the latest; guess
+SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
 _TURNS_M_S2 = wp.constant(2.5)  # how fast a person stops, turns and sets off; guess
 _UNTOLD_S = wp.constant(1.0)  # who was not seen for longer may be anywhere: nothing is reckoned from farther back
 _REPORTED_S = wp.constant(0.25)  # from the first picture of who sets off until their velocity tells it; measured,
@@ -55,6 +55,12 @@ def keep_off(
     k = KeepOff()
     k.owner_m, k.brake, k.reaction_s, k.escape_climb = owner_m, brake, reaction_s, escape_climb
     return k
+
+
+@wp.func
+def unit_of(way: wp.vec2) -> wp.vec2:
+    """The direction of a way [1]; none of a way that is none."""
+    return way / wp.max(wp.length(way), 1.0e-3)
 
 
 @wp.func
@@ -117,7 +123,7 @@ def closing_max(
 @wp.func
 def kept_off(velocity: wp.vec2, way: wp.vec2, most: float) -> wp.vec2:
     """A level velocity without what is faster towards somebody than it may be [m/s]."""
-    unit = way / wp.max(wp.length(way), 1.0e-3)
+    unit = unit_of(way)
     return velocity - wp.max(wp.dot(velocity, unit) - most, 0.0) * unit
 
 
@@ -158,7 +164,7 @@ def bounds(
     over_then_m = over_m - k.reaction_s * wp.max(own_vel[2], 0.0)  # height that it loses is none to go by
     b.closing_max = closing_max(k, way, level, other_vel, vel_std, age_s, over_then_m)
     b.then_m = distance_then(way, level, other_vel, k.reaction_s, age_s)
-    unit = way / wp.max(wp.length(way), 1.0e-3)
+    unit = unit_of(way)
     closing, coming = wp.dot(level - other_vel, unit), -wp.dot(other_vel, unit)
     b.sinking_max = sinking_max(k, over_then_m, b.then_m, closing, coming, age_s)
     return b

@@ -154,6 +154,7 @@ def test_who_comes_is_climbed_over_in_time_even_if_it_goes_back_as_fast_as_they_
     """A trunk may end its way back."""
     assert sinks(2.2, (-4.0, 0.0, 0.0), -4.0) == pytest.approx(-2.3)
     assert sinks(1.6, (0.0, 0.0, 0.0), -2.0) < -1.0 < 1.0 < sinks(1.6, (0.0, 0.0, 0.0), 0.0)
+    assert sinks(1.6, (0.0, 0.0, 0.0), 2.0) > 1.0  # they go
 
 
 def test_height_that_it_is_losing_is_none_to_go_by() -> None:
