@@ -37,6 +37,7 @@ SCRIPTS = {
     "roofline": "bench.learning.roofline",
     "sac": "bench.learning.sac",
     "offline": "bench.learning.offline",
+    "dataset": "bench.learning.dataset_build",
     "companion": "bench.learning.companion",
     "tracker": "bench.learning.tracker",
     "camera": "bench.flying.camera",
