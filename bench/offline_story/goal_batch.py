@@ -1,11 +1,13 @@
 """Policies that drive into spots or fly to goals, judged in batch under the conditions of `honeyguide benchmark`.
 
 What is drawn there is drawn here, and what is not is as the vehicle's maker says. What is left apart: the guard, which
-a batch has not, how messages age, and another draw of worlds, winds and goals.
+a batch has not, how messages age, that a companion judges its arrival by the estimate, and another draw of worlds,
+winds and goals.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from bench.navigate import LONGEST as NAVIGATE_LONGEST
 from bench.offline_story.story import Judged, Split, figure
 from mission.benchmark.navigating import CONDITIONS as FORESTS
 from mission.benchmark.parking import CONDITIONS as LOTS
+from policies.companion.skills.driving import ALIGNED_RAD, ARRIVED_M, STANDING_M_S
 from policies.learn.export.policy_file import load_policy
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.drive.drive import Drive
@@ -26,6 +29,7 @@ from policies.tasks.episode import Outcome
 from policies.tasks.navigate.navigate import Navigate
 from policies.tasks.navigate.navigate_kernels import MEASURES as NAVIGATE_MEASURES
 from policies.tasks.task_params import Sampler
+from sim.world.driving_worlds import CAR_PARK
 
 SEED = 1_000_003  # no training run is given it
 EPISODES: Mapping[Split, int] = {"train": 48, "test": 96}  # of each condition; in spots nearly, half face either way
@@ -37,6 +41,10 @@ _PARKED: dict[str, float | Sampler] = {
     "rolling_scale": 1.0,
     "wind_m_s": Sampler(intervals=((0.0, 6.0),)),
     "mover_count": float(_CARTS),
+    "hill_height_m": CAR_PARK.hill_height_m,
+    "reach_m": ARRIVED_M,  # that make a companion stop: who passes within the task's own drives on
+    "align_deg": degrees(ALIGNED_RAD),
+    "stop_m_s": STANDING_M_S,
     "extra_time_s": 115.0,  # the benchmark's two minutes
     "slowest_m_s": 5.0,
 }
