@@ -115,19 +115,19 @@ its 92 % are of, are all found as with 0.002. The row to hold beside the documen
 [below](#like-for-like-few-goals-and-whole-quarters): 100 % on those goals, 74 % on new spots.
 
 All rows of parking but the improved ones were trained before cells were set apart for validation: on 540 cells, where
-it now is 495. Of three seeds of an improved row the one ships that did best on validation spots. Of Parking 1 it parks on
-97.42 % (96.89 to 97.87 %) of 4,000 new ones. Tried for it and given up: time that costs nearly twice as much (with less
-sharpening and 8 million steps, one seed): 94.6 % of 4,000 new spots; it hit walls and blocks in 2.6 %.
+it now is 495. Of three seeds of an improved row the one ships that did best on validation spots. Of Parking 1 it
+parks on 97.42 % (96.89 to 97.87 %) of 4,000 new ones. Tried for it and given up: time that costs nearly twice as much
+(with less sharpening and 8 million steps, one seed): 94.6 % of 4,000 new spots; it hit walls and blocks in 2.6 %.
 
 What ships for "Parking 2, improved" (seed 2) parks on 97.22 % (96.67 to 97.69 %) of 4,000 new spots. In 88 of the 111
-others a moving obstacle hit it, in 22 it drove into a wall. 98 % was wanted and not reached. Four frames that see 10 m
-far in place of two that see 20, and sharpening, are new in it; five seeds without, of 48 million steps, came to 96.84 %
-(96.21 to 97.47 %) of 1,000 new spots each. Tried, one seed each: twice as many rays, without sharpening: 96.58 % of
-4,000, and 97.38 % with drawn actions; spheres of 0.5 m for rays, no better after 10 million steps; going on from the policy
-before with -6 for every hit (it had -2 for obstacles, -1 for walls), stopped after 5.5 million steps at 96.8 % of 2,000
-training spots; going on with -4, faster obstacles in the first half, larger buffers and sharpening, 8 million steps:
-97.30 % (96.75 to 97.76 %). From nothing, -6 was stopped after 6 million steps at 90.6 % of the drawn episodes, as the
-five seeds had by then, and -4 with less entropy after 4 million at 84 %."""
+others a moving obstacle hit it, in 22 it drove into a wall. 98 % was wanted and not reached. Four frames that see 10
+m far in place of two that see 20, and sharpening, are new in it; five seeds without, of 48 million steps, came to
+96.84 % (96.21 to 97.47 %) of 1,000 new spots each. Tried, one seed each: twice as many rays, without sharpening:
+96.58 % of 4,000, and 97.38 % with drawn actions; spheres of 0.5 m for rays, no better after 10 million steps; going
+on from the policy before with -6 for every hit (it had -2 for obstacles, -1 for walls), stopped after 5.5 million
+steps at 96.8 % of 2,000 training spots; going on with -4, faster obstacles in the first half, larger buffers and
+sharpening, 8 million steps: 97.30 % (96.75 to 97.76 %). From nothing, -6 was stopped after 6 million steps at 90.6 %
+of the drawn episodes, as the five seeds had by then, and -4 with less entropy after 4 million at 84 %."""
 
 _LIKE_FOR_LIKE_WORDS = """\
 The document trained on one goal (PPO) and on three (PPO + GAIL); the rows above on some 500 cells of 1 m all over the
