@@ -62,6 +62,7 @@ class Scene:
 
     world: WorldMap
     goal: Pose
+    out: float  # 1: the goal's nose is to the aisle, -1: its tail is, 0: on a course
     noise: float
     seed: int
     rows: dict[str, Any]
@@ -75,12 +76,13 @@ def scenes_of(preset: str, count: int, seed: int = SEED) -> list[Scene]:
         raise TypeError(task)
     task.reset(seed)
     goals, noise = task.driving.goals.numpy(), task.driving.flight.numpy()["sensor_noise"]
-    seeds = task.noise_seeds.numpy()
+    outs, seeds = task.driving.outs.numpy(), task.noise_seeds.numpy()
     names = ("model", "wind_model", "body", "truth")
     return [
         Scene(
             world=task.worlds.map(i),
             goal=(float(goals[i][0]), float(goals[i][1]), float(goals[i][2])),
+            out=float(outs[i]),
             noise=round(4.0 * float(noise[i])) / 4.0,
             seed=int(seeds[i]),
             rows={name: task.rig.rows[name][i].copy() for name in names},
@@ -149,8 +151,8 @@ def measured(
     """A line of the table, with what went wrong printed."""
     drives = judged(policy, preset, count, seed, scan_lag_s)
     pilot = DrivingPilot(policy, source)
-    arrivals = []
-    for i, scene in enumerate(scenes_of(preset, count, seed)):
+    arrivals, scenes = [], scenes_of(preset, count, seed)
+    for i, scene in enumerate(scenes):
         arrivals.append(driven(scene, pilot, is_by_sticks=is_by_sticks, scan_lag_s=scan_lag_s))
         if not arrivals[-1].is_there:
             print(i, arrivals[-1], Outcome(int(drives.outcomes[i])).name, flush=True)
@@ -158,6 +160,11 @@ def measured(
     both = Counter((arrival.is_there, bool(is_good)) for arrival, is_good in zip(arrivals, batch, strict=True))
     print(f"{preset}: over MAVLink and in the batch {both[True, True]}, over MAVLink alone {both[True, False]}, "
           f"in the batch alone {both[False, True]}, neither {both[False, False]}")  # fmt: skip
+    outs, there = np.array([scene.out for scene in scenes]), np.array([arrival.is_there for arrival in arrivals])
+    for out, way in ((1.0, "the nose"), (-1.0, "the tail")):
+        if (chosen := outs == out).any():
+            print(f"{way} to the aisle: {there[chosen].sum()} over MAVLink, {batch[chosen].sum()} in the batch, "
+                  f"of {chosen.sum()}")  # fmt: skip
     return row(preset, arrivals, drives)
 
 
