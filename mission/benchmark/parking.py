@@ -29,6 +29,7 @@ from sim.world.driving_worlds import CAR_PARK
 from sim.world.spots import spots_of
 
 READY_S, ALL_S = 60.0, 240.0
+WIND_MAX_M_S = 6.0
 LEAST_PARKED, MOST_TOUCHED = 0.95, 0.02
 COLUMNS = ("condition", "drives", "parked", "touched", "time", "off its middle", "changed / min")
 
@@ -87,7 +88,7 @@ def parked(pilot: DrivingPilot, lot: Lot, seed: int, guard: GuardSettings, kept:
         if ready.error is not None:
             return Parking(seed, "missed", nan, nan, nan, 0.0, str(ready.error))
         flight.rig.set_air(
-            wind_model(rng.uniform(0.0, 6.0), rng.uniform(0.0, 360.0), TURBULENCE, rng.uniform(0.0, 3.0))
+            wind_model(rng.uniform(0.0, WIND_MAX_M_S), rng.uniform(0.0, 360.0), TURBULENCE, rng.uniform(0.0, 3.0))
         )
         free = [spot for spot in spots_of(flight.world) if spot.is_free]
         pose = pose_in(free[int(rng.integers(len(free)))], is_reverse=lot.is_reverse)
