@@ -74,8 +74,8 @@ TRAININGS = {
         episodes=250,
         numbers={"trees_per_ha": 600.0},
     ),
-    "drive-park": Training("Drive", ("drive-park-late",), DRIVE_LONGEST, touched_and_time, episodes=250),
-    "drive-reach": Training("Drive", ("drive-reach-late",), DRIVE_LONGEST, touched_and_time, episodes=250),
+    "drive-park": Training("Drive", ("drive-park", "drive-park-careful"), DRIVE_LONGEST, touched_and_time, episodes=250),
+    "drive-reach": Training("Drive", ("drive-reach",), DRIVE_LONGEST, touched_and_time, episodes=250),
 }
 
 
