@@ -60,8 +60,10 @@ reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policy from nothing,
 reproduce-offline: $(STAMP) ## Log flights, learn from their logs alone, forecast, then fly: to follow, park and navigate; one: ARGS="--story park"
 	@$(BIN)/python -m bench.offline_story $(ARGS)
 
-reproduce-drive: $(STAMP) ## Train and judge the policies of docs/results/drive.md (half an hour); only judge: ARGS="judge"
-	@$(BIN)/python -m bench.drive $(ARGS)
+reproduce-drive: $(STAMP) ## Train the rover's policies from nothing, three seeds of each, choose and judge them (two hours); only choose: ARGS="judge"
+	@$(BIN)/python -m bench.training_seeds drive-park $(ARGS)
+	@$(BIN)/python -m bench.training_seeds drive-reach $(ARGS)
+	@$(BIN)/python -m bench.drive results/drive-park-chosen.pt results/drive-reach-chosen.pt
 
 # loadfile keeps a test file's kernels in one process, so that each is compiled once; it would wait for ever for the
 # successor of a worker that died, so there is none. Bytecode is kept, also where the environment says otherwise: tests

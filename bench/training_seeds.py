@@ -1,11 +1,13 @@
 """`python -m bench.training_seeds NAME [judge] [test] [POLICY …]`: three seeds of a policy, and which of them is best.
 
 In: `navigate`, `drive-park` or `drive-reach`, and the recipes of its legs. Out: results/NAME-seed-N with a run of each
-leg, a table of how the last ones do in validation worlds, their scans 0 to 0.2 s late, and the best as
-results/NAME-chosen.pt. With `judge`, or policy files, it judges only. What is chosen by is neither trained on nor
-of the tests; with `test` the worlds are those of the tests, and nothing is chosen.
+leg, one on each core, and what it said in a log beside it; a table of how the last ones do in validation worlds, their
+scans 0 to 0.2 s late, and the best as results/NAME-chosen.pt. With `judge`, or policy files, it judges only; with
+`seed=N LEG` it trains that leg alone. What is chosen by is neither trained on nor of the tests; with `test` the worlds
+are those of the tests, and nothing is chosen.
 """
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -15,11 +17,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.console import Console
 
 from bench.drive import LONGEST as DRIVE_LONGEST
 from bench.goal_episodes import Outcomes, first_episodes
 from bench.navigate import LONGEST as NAVIGATE_LONGEST
 from bench.navigate import arrival_speeds
+from bench.side_by_side import Job, run_side_by_side
 from common.files import write_whole
 from common.intervals import Interval, rate
 from policies.learn.export.policy_file import load_policy
@@ -74,7 +78,9 @@ TRAININGS = {
         episodes=250,
         numbers={"trees_per_ha": 600.0},
     ),
-    "drive-park": Training("Drive", ("drive-park", "drive-park-careful"), DRIVE_LONGEST, touched_and_time, episodes=250),
+    "drive-park": Training(
+        "Drive", ("drive-park", "drive-park-careful"), DRIVE_LONGEST, touched_and_time, episodes=250
+    ),
     "drive-reach": Training("Drive", ("drive-reach",), DRIVE_LONGEST, touched_and_time, episodes=250),
 }
 
@@ -101,22 +107,29 @@ class Judged:
         return "| " + " | ".join(cells) + " |"
 
 
-def train(name: str, seed: int) -> Path:
-    """The policy of the last leg; the legs are runs in a folder of their seed."""
+def train_all(name: str) -> list[str]:
+    """Trains every leg of every seed, one on each core, whichever may begin; names those that failed."""
+    jobs = []
+    for before, leg in zip((None, *TRAININGS[name].legs), TRAININGS[name].legs, strict=False):
+        for seed in SEEDS:
+            policy_of(name, seed, leg).unlink(missing_ok=True)  # others wait for it
+            words = ("bench.training_seeds", name, f"seed={seed}", leg)
+            is_ready = policy_of(name, seed, before).exists if before else lambda: True
+            jobs.append(Job(f"{name}-seed-{seed}-{leg}", words, is_ready=is_ready))
+    return run_side_by_side(jobs, RESULTS, len(os.sched_getaffinity(0)), Console())
+
+
+def train(name: str, seed: int, leg: str) -> None:
+    """Trains a leg of a seed, a run in the folder of the seed."""
     folder = _folder(name, seed)
-    folder.mkdir(parents=True, exist_ok=True)
-    for leg in TRAININGS[name].legs:  # a recipe names the policy that it goes on from as it lies beside it
-        command = [sys.executable, "-c", "from mission.cli import main; main()"]
-        subprocess.run(
-            [*command, "train", leg, "--run-id", leg, "--seed", str(seed), "--force"], cwd=folder, check=True
-        )
-    return policy_of(name, seed)
+    folder.mkdir(parents=True, exist_ok=True)  # a recipe names the policy that it goes on from as it lies beside it
+    command = [sys.executable, "-c", "from mission.cli import main; main()"]
+    subprocess.run([*command, "train", leg, "--run-id", leg, "--seed", str(seed), "--force"], cwd=folder, check=True)
 
 
-def policy_of(name: str, seed: int) -> Path:
-    """Where the policy of a seed lies once it is trained."""
-    training = TRAININGS[name]
-    return _folder(name, seed) / "results" / training.legs[-1] / f"{training.task}.pt"
+def policy_of(name: str, seed: int, leg: str) -> Path:
+    """Where the policy of a leg of a seed lies once it is trained."""
+    return _folder(name, seed) / "results" / leg / f"{TRAININGS[name].task}.pt"
 
 
 def _folder(name: str, seed: int) -> Path:
@@ -146,9 +159,15 @@ def main(arguments: Sequence[str]) -> int:
         print(f"training_seeds: name one of {', '.join(TRAININGS)}")
         return 2
     name, words = arguments[0], arguments[1:]
+    if words and words[0].startswith("seed="):
+        train(name, int(words[0].removeprefix("seed=")), words[1])
+        return 0
+    if not words and (failed := train_all(name)):
+        print(f"training_seeds: {', '.join(failed)} failed; see the logs in {RESULTS}")
+        return 1
     named = [Path(text) for text in words if text not in ("judge", "test")]
     split = "test" if "test" in words else "validation"
-    paths = named or [policy_of(name, seed) if words else train(name, seed) for seed in SEEDS]
+    paths = named or [policy_of(name, seed, TRAININGS[name].legs[-1]) for seed in SEEDS]
     print(HEAD, flush=True)
     found = []
     for path in paths:

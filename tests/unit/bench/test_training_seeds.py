@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.training_seeds import TRAININGS, Judged, main
+from bench.training_seeds import SEEDS, TRAININGS, Judged, main, policy_of, train_all
 from common.intervals import Interval
 from policies.learn.config.load import load_config
 from policies.learn.config.recipes import recipe
@@ -16,6 +16,23 @@ def test_legs_are_recipes_of_the_task_and_the_last_has_late_scans(name):
     configs = [load_config(recipe(leg)).config for leg in story.legs]
     assert {config.env_settings.env_path for config in configs} == {story.task}
     assert {"scan_lag_s", "attitude_error_deg"} <= set(configs[-1].environment_parameters)
+
+
+def test_a_leg_begins_when_the_one_before_it_has_ended_and_not_by_what_an_earlier_training_left(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    name = "drive-park"
+    first, second = TRAININGS[name].legs
+    earlier = [policy_of(name, seed, leg) for seed in SEEDS for leg in (first, second)]
+    for path in earlier:
+        path.parent.mkdir(parents=True)
+        path.touch()
+    monkeypatch.setattr("bench.training_seeds.run_side_by_side", lambda jobs, *_: jobs)
+    jobs = {job.name: job for job in train_all(name)}
+    assert len(jobs) == len(earlier)
+    assert {job for job in jobs if jobs[job].is_ready()} == {f"{name}-seed-{seed}-{first}" for seed in SEEDS}
+    policy_of(name, 2, first).touch()
+    assert jobs[f"{name}-seed-2-{second}"].is_ready()
+    assert not jobs[f"{name}-seed-1-{second}"].is_ready()
 
 
 def test_a_policy_is_as_good_as_its_intervals_begin_on_average():
