@@ -79,9 +79,9 @@ TRAININGS = {
         numbers={"trees_per_ha": 600.0},
     ),
     "drive-park": Training(
-        "Drive", ("drive-park", "drive-park-careful"), DRIVE_LONGEST, touched_and_time, episodes=250
+        "Drive", ("drive-park", "drive-park-careful"), DRIVE_LONGEST, touched_and_time, episodes=1000
     ),
-    "drive-reach": Training("Drive", ("drive-reach",), DRIVE_LONGEST, touched_and_time, episodes=250),
+    "drive-reach": Training("Drive", ("drive-reach",), DRIVE_LONGEST, touched_and_time, episodes=1000),
 }
 
 
