@@ -49,7 +49,7 @@ reproduce-cars: $(STAMP) ## Train every row of docs/results/cars.md from scratch
 reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow.md (hours); flags: ARGS="student"
 	@$(BIN)/python -m bench.follow $(ARGS)
 
-reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in three legs of three seeds, choose and judge it (two hours); only choose: ARGS="judge"
+reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in three legs of three seeds, choose and judge it (two hours); without training: ARGS="judge"
 	@$(BIN)/python -m bench.training_seeds navigate $(ARGS)
 	@$(BIN)/python -m bench.navigate results/navigate-chosen.pt
 
@@ -60,7 +60,7 @@ reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policy from nothing,
 reproduce-offline: $(STAMP) ## Log flights, learn from their logs alone, forecast, then fly: to follow, park and navigate; one: ARGS="--story park"
 	@$(BIN)/python -m bench.offline_story $(ARGS)
 
-reproduce-drive: $(STAMP) ## Train the rover's policies from nothing, three seeds of each, choose and judge them (two hours); only choose: ARGS="judge"
+reproduce-drive: $(STAMP) ## Train the rover's policies from nothing, three seeds of each, choose and judge them (two hours); without training: ARGS="judge"
 	@$(BIN)/python -m bench.training_seeds drive-park $(ARGS)
 	@$(BIN)/python -m bench.training_seeds drive-reach $(ARGS)
 	@$(BIN)/python -m bench.drive results/drive-park-chosen.pt results/drive-reach-chosen.pt

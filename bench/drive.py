@@ -1,8 +1,8 @@
 """`python -m bench.drive [batch] [POLICY …]`: how well does a rover park, and drive to poses?
 
 In: the policies that ship, or policy files of Drive. Held-out worlds with estimator, wind, noise and varied vehicles,
-as many episodes each. Out: docs/results/drive.md, a table with 95 % intervals; then, unless `batch` is asked for alone,
-the same over MAVLink (`drive_mavlink.py`).
+as many episodes each. Out: a table with 95 % intervals; then, unless `batch` is asked for alone, the same over MAVLink
+(`drive_mavlink.py`). Of what ships both are written into docs/results/drive.md, of others they are printed.
 """
 
 import sys
@@ -18,7 +18,7 @@ from bench.row import machine
 from common.files import write_whole
 from common.intervals import bootstrap, rate
 from policies.learn.export.policy_file import load_policy
-from policies.learn.export.policy_path import find_policy
+from policies.learn.export.policy_path import CheckpointError, find_policy
 from policies.learn.networks.policy import Policy
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.drive.drive import Drive
@@ -83,20 +83,30 @@ def row(preset: str, drives: Drives) -> str:
 
 
 def main(arguments: list[str]) -> int:
+    named = [text for text in arguments if text != "batch"]
+    try:
+        paths = [find_policy(text) for text in named or [f"drive-{preset}" for preset in AIMS]]
+    except CheckpointError as error:
+        print(error)
+        return 2
     lines, policies = [], {}
-    named = [Path(text) for text in arguments if text != "batch"]
-    for path in named or [find_policy(f"drive-{preset}") for preset in AIMS]:
+    for path in paths:
         policy, card = load_policy(path)
         preset = str(card.settings["preset"])
         policies[preset] = path
         lines.append(row(preset, judged(policy, preset)))
         print(lines[-1], flush=True)
-    page = PAGE.format(episodes=EPISODES, rows="\n".join(lines), machine=machine())
-    write_whole(PAGE_FILE, (page + kept_from(PAGE_FILE.read_text(), FLOWN)).encode())
+    if not named:
+        page = PAGE.format(episodes=EPISODES, rows="\n".join(lines), machine=machine())
+        write_whole(PAGE_FILE, (page + kept_from(PAGE_FILE.read_text(), FLOWN)).encode())
     if "batch" not in arguments:
-        from bench.drive_mavlink import SCENES, write_section  # which judges by this module
+        from bench.drive_mavlink import SCENES, measured, write_section  # which judges by this module
 
-        write_section(policies, SCENES)
+        if not named:
+            write_section(policies, SCENES)
+            return 0
+        for preset, path in policies.items():
+            print(measured(preset, load_policy(path)[0], str(path), SCENES), flush=True)
     return 0
 
 

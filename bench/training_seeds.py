@@ -7,7 +7,6 @@ scans 0 to 0.2 s late, and the best as results/NAME-chosen.pt. With `judge`, or 
 are those of the tests, and nothing is chosen.
 """
 
-import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -26,6 +25,8 @@ from bench.navigate import arrival_speeds
 from bench.side_by_side import Job, run_side_by_side
 from common.files import write_whole
 from common.intervals import Interval, rate
+from policies.learn.config.load import load_config
+from policies.learn.config.recipes import recipe
 from policies.learn.export.policy_file import load_policy
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.drive.drive import Drive
@@ -110,21 +111,30 @@ class Judged:
 def train_all(name: str) -> list[str]:
     """Trains every leg of every seed, one on each core, whichever may begin; names those that failed."""
     jobs = []
+    _chosen(name).unlink(missing_ok=True)
     for before, leg in zip((None, *TRAININGS[name].legs), TRAININGS[name].legs, strict=False):
         for seed in SEEDS:
             policy_of(name, seed, leg).unlink(missing_ok=True)  # others wait for it
             words = ("bench.training_seeds", name, f"seed={seed}", leg)
             is_ready = policy_of(name, seed, before).exists if before else lambda: True
             jobs.append(Job(f"{name}-seed-{seed}-{leg}", words, is_ready=is_ready))
-    return run_side_by_side(jobs, RESULTS, len(os.sched_getaffinity(0)), Console())
+    return run_side_by_side(jobs, RESULTS, len(jobs), Console())
 
 
 def train(name: str, seed: int, leg: str) -> None:
-    """Trains a leg of a seed, a run in the folder of the seed."""
+    """Trains a leg of a seed, a run in the folder of the seed.
+
+    Raises:
+        SystemExit: it was stopped before its end; no leg goes on from what it left.
+    """
     folder = _folder(name, seed)
     folder.mkdir(parents=True, exist_ok=True)  # a recipe names the policy that it goes on from as it lies beside it
     command = [sys.executable, "-c", "from mission.cli import main; main()"]
     subprocess.run([*command, "train", leg, "--run-id", leg, "--seed", str(seed), "--force"], cwd=folder, check=True)
+    path, wanted = policy_of(name, seed, leg), load_config(recipe(leg)).config.behavior.max_steps
+    if (steps := load_policy(path)[1].steps) < wanted:
+        path.unlink()
+        raise SystemExit(f"training_seeds: {path} was stopped after {steps:,} of {wanted:,} steps")
 
 
 def policy_of(name: str, seed: int, leg: str) -> Path:
@@ -134,6 +144,10 @@ def policy_of(name: str, seed: int, leg: str) -> Path:
 
 def _folder(name: str, seed: int) -> Path:
     return RESULTS / f"{name}-seed-{seed}"
+
+
+def _chosen(name: str) -> Path:
+    return RESULTS / f"{name}-chosen.pt"
 
 
 def judged(training: Training, path: Path, split: str = "validation", lags_s: Sequence[float] = LAGS_S) -> Judged:
@@ -160,10 +174,13 @@ def main(arguments: Sequence[str]) -> int:
         return 2
     name, words = arguments[0], arguments[1:]
     if words and words[0].startswith("seed="):
+        if len(words) != 2 or words[1] not in TRAININGS[name].legs:
+            print(f"training_seeds: after seed=N name one of {', '.join(TRAININGS[name].legs)}")
+            return 2
         train(name, int(words[0].removeprefix("seed=")), words[1])
         return 0
     if not words and (failed := train_all(name)):
-        print(f"training_seeds: {', '.join(failed)} failed; see the logs in {RESULTS}")
+        print(f"training_seeds: {', '.join(failed)} failed; see the ends of their logs in {RESULTS}")
         return 1
     named = [Path(text) for text in words if text not in ("judge", "test")]
     split = "test" if "test" in words else "validation"
@@ -178,7 +195,7 @@ def main(arguments: Sequence[str]) -> int:
     best = max(found, key=lambda each: each.low)
     print(f"chosen: {best.path}, whose intervals begin at {100 * best.low:.1f} % on average")
     if not named:
-        write_whole(RESULTS / f"{name}-chosen.pt", best.path.read_bytes())
+        write_whole(_chosen(name), best.path.read_bytes())
     return 0
 
 

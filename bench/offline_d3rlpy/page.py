@@ -101,8 +101,8 @@ def write_section(rows: list[dict[str, Any]]) -> None:
         f"D4RL export): {steps:,} gradient steps of 256 decisions, 2 layers of {hidden}, swish, discount 0.99, Adam at "
         "3e-4, one thread. A row is as many trainings by both as it has seeds; scores are their means and deviations, "
         "0 at random actions and 100 at the pilot without noise, which is judged as they are. Where the pilot is a "
-        "policy that ships, the rewards to learn from weigh as in its training, and the score as the task has it by "
-        "itself. Times are of the processor, for the gradient steps "
+        "policy that ships (of `drive-park` the one before it met late scans), the rewards to learn from weigh as in "
+        "its training, and the score as the task has it by itself. Times are of the processor, for the gradient steps "
         f"alone; d3rlpy takes longer than we do, {spans}. {_verdict(rows)}"
     )
     lines = [

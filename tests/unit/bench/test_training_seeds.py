@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from bench.training_seeds import SEEDS, TRAININGS, Judged, main, policy_of, train_all
+from bench.training_seeds import SEEDS, TRAININGS, Judged, main, policy_of, train, train_all
 from common.intervals import Interval
 from policies.learn.config.load import load_config
 from policies.learn.config.recipes import recipe
+from policies.learn.export.policy_path import find_policy
 
 
 @pytest.mark.parametrize("name", TRAININGS)
@@ -35,6 +36,31 @@ def test_a_leg_begins_when_the_one_before_it_has_ended_and_not_by_what_an_earlie
     assert not jobs[f"{name}-seed-1-{second}"].is_ready()
 
 
+def test_a_leg_that_was_stopped_leaves_no_policy_to_go_on_from(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = policy_of("drive-reach", 1, "drive-reach")
+
+    def stopped(*_: object, **__: object) -> None:
+        path.parent.mkdir(parents=True)
+        path.write_bytes(find_policy("reach-target").read_bytes())
+
+    monkeypatch.setattr("bench.training_seeds.subprocess.run", stopped)
+    with pytest.raises(SystemExit, match="was stopped after"):
+        train("drive-reach", 1, "drive-reach")
+    assert not path.exists()
+
+
+def test_failed_legs_are_named_and_nothing_is_chosen(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("bench.training_seeds.run_side_by_side", lambda jobs, *_: [jobs[0].name])
+    chosen = Path("results/drive-reach-chosen.pt")
+    chosen.parent.mkdir()
+    chosen.touch()
+    assert main(["drive-reach"]) == 1
+    assert "drive-reach-seed-1-drive-reach failed" in capsys.readouterr().out
+    assert not chosen.exists()
+
+
 def test_a_policy_is_as_good_as_its_intervals_begin_on_average():
     success = (Interval(0.9, 0.8, 1.0), Interval(0.8, 0.7, 0.9), Interval(0.5, 0.3, 0.7))
     judged = Judged(Path("a.pt"), success, ("1 s", "2 s", "3 s"))
@@ -45,3 +71,5 @@ def test_a_policy_is_as_good_as_its_intervals_begin_on_average():
 def test_a_policy_that_is_not_known_is_refused(capsys):
     assert main(["hover"]) == 2
     assert "name one of navigate, drive-park, drive-reach" in capsys.readouterr().out
+    assert main(["drive-park", "seed=1", "hover"]) == 2
+    assert "name one of drive-park, drive-park-careful" in capsys.readouterr().out
