@@ -89,11 +89,11 @@ def main(arguments: list[str]) -> int:
     except CheckpointError as error:
         print(error)
         return 2
-    lines, policies = [], {}
+    lines, policies = [], []
     for path in paths:
         policy, card = load_policy(path)
         preset = str(card.settings["preset"])
-        policies[preset] = path
+        policies.append((preset, path))
         lines.append(row(preset, judged(policy, preset)))
         print(lines[-1], flush=True)
     if not named:
@@ -103,9 +103,9 @@ def main(arguments: list[str]) -> int:
         from bench.drive_mavlink import SCENES, measured, write_section  # which judges by this module
 
         if not named:
-            write_section(policies, SCENES)
+            write_section(dict(policies), SCENES)
             return 0
-        for preset, path in policies.items():
+        for preset, path in policies:
             print(measured(preset, load_policy(path)[0], str(path), SCENES), flush=True)
     return 0
 
