@@ -11,14 +11,17 @@ from math import asin, atan2, cos, degrees, isfinite, isnan, sin
 from typing import Any
 
 import numpy as np
+import warp as wp
 
 from autopilot.mavlink.wire.convert import UINT16_MAX, quat_from_wxyz
 from autopilot.mavlink.wire.number_bounds import is_known
 from common.attitude import Quat, rotated, yaw_of
 from common.range_sectors import SCANNER, RangeLayout
+from common.warp_start import start_warp
 from policies.companion.senses.poses import PoseHistory
 from policies.companion.skills.skill import Floats
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
+from policies.tasks.flight.moved_ranges import move_rows, sectors_struct
 
 SCAN_HZ = 20.0  # that the vehicle is asked for
 OLD_US = 500_000  # guess, as of images: five scans missed
@@ -55,6 +58,7 @@ class Ranges:
         self._unknown_count = layout.sectors
         self._is_new = False
         self._boot_us = NEVER_US
+        self._prepare_move()
         self._own, self._clock = vehicle.own, vehicle.clock
         system_id = vehicle.system_id
 
@@ -81,6 +85,33 @@ class Ranges:
         """Whether new sectors have come in since the last call."""
         is_new, self._is_new = self._is_new, False
         return is_new
+
+    def from_here(self) -> Floats:
+        """The newest ranges as they would be from where the vehicle is now, by the kernel function of training.
+
+        Those of tilted beams are as they were measured, and all are where it is not known where that was.
+        """
+        pose, own = self.poses.at(self.taken_us), self._own
+        if pose is None or self.taken_us == NEVER_US or not isfinite(own.pos_ned[0]):
+            return self.ranges_m
+        self._measured[0] = self._moved[0] = self.ranges_m
+        self._was[0] = *pose.pos_ned[:2], yaw_of(pose.q_ned_from_frd)
+        self._here[0] = *own.pos_ned[:2], yaw_of(own.q_ned_from_frd)
+        self._move.launch()
+        moved: Floats = self._moved[0].copy()
+        return moved
+
+    def _prepare_move(self) -> None:
+        start_warp()
+        shape = (1, self.ranges_m.size)
+        measured, moved = wp.zeros(shape, dtype=float), wp.zeros(shape, dtype=float)
+        was, here = wp.zeros(1, dtype=wp.vec3), wp.zeros(1, dtype=wp.vec3)
+        self._measured: Floats = measured.numpy()  # live views, as of the others
+        self._moved: Floats = moved.numpy()
+        self._was: Floats = was.numpy()
+        self._here: Floats = here.numpy()
+        inputs = [measured, was, here, sectors_struct(self.layout), moved]
+        self._move = wp.launch(move_rows, 1, inputs, record_cmd=True)
 
     def trouble(self, time_us: int, old_us: int = OLD_US) -> str:
         """Why nothing can be decided on them; "" if it can.

@@ -110,8 +110,9 @@ class Driving(GoalSkill):
             return None
         is_still = is_flying and hypot(*own.vel_ned) < STILL_M_S
         self._still_count = self._still_count + 1 if is_still else 0
-        self._taken_count = self._taken_count + 1 if is_taken(pose, own, self.ranges.ranges_m) else 0
-        vector = self._observer.vector(own, _shown(pose, own), self.ranges.ranges_m, last_action)
+        ranges_m = self.ranges.from_here()
+        self._taken_count = self._taken_count + 1 if is_taken(pose, own, ranges_m) else 0
+        vector = self._observer.vector(own, _shown(pose, own), ranges_m, last_action)
         return self._act(vector, is_flying=is_flying)
 
     def setpoint(self, action: Floats, own: Own) -> Velocity:
@@ -150,7 +151,7 @@ class Driving(GoalSkill):
         """Why a goto cannot be driven to."""
         own = self._vehicle.own
         pose = (goal.pos_ned[0], goal.pos_ned[1], _heading_of(goal, own))
-        return TAKEN if is_taken(pose, own, self.ranges.ranges_m) else ""
+        return TAKEN if is_taken(pose, own, self.ranges.from_here()) else ""
 
     def _note_arrival(self, own: Own) -> None:
         """Goes on to the next goal if it stands in this one, as near to its middle as it comes."""

@@ -85,7 +85,7 @@ class Navigating(GoalSkill):
         if goal_ned is None or not self._is_due(time_us):
             return None
         shown_ned = _shown(goal_ned, own, self._shown_m)
-        vector = self._observer.vector(own, shown_ned, self.ranges.ranges_m, last_action, time_us)
+        vector = self._observer.vector(own, shown_ned, self.ranges.from_here(), last_action, time_us)
         return self._act(vector, is_flying=is_flying)
 
     def setpoint(self, action: Floats, own: Own) -> Velocity:

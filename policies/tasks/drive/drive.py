@@ -12,12 +12,14 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.geodesy import DEFAULT_HOME
+from common.range_sectors import GROUND_RING
 from policies.tasks.drive.drive_kernels import MEASURES, DriveRules, DriveState, act, judge, place, prepare
 from policies.tasks.drive.drive_params import PARAMS, PRESETS, DriveParams
 from policies.tasks.drive.drive_top_view import draw
 from policies.tasks.drive.observe import ACTIONS, FRAME, LAYOUT_VERSION, SECTORS, STACK
 from policies.tasks.drive.settings import DriveSettings
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
+from policies.tasks.flight.moved_ranges import sectors_struct
 from policies.tasks.flight.reported import KEPT_SCANS
 from policies.tasks.flight.standing_bank import standing_bank
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
@@ -59,6 +61,7 @@ class Drive(FlightTask):
         rules.has_estimator = int(settings.has_estimator)
         rules.spot_count = world.spot_count
         rules.decision_s = self.decision_s
+        rules.sectors = sectors_struct(GROUND_RING)
         buffers, rig, state = self.buffers, self.rig.arrays, self.driving
         start = self.start()
         self._act = self.record(act, buffers, rig)
@@ -106,6 +109,7 @@ class Drive(FlightTask):
         state.attitude_errors = self._zeros("attitude_errors", n, wp.quat)
         state.ranges_m = self._zeros("ranges_m", (n, SECTORS), float)
         state.scans_m = self._zeros("scans_m", (n, KEPT_SCANS, SECTORS), float)
+        state.scan_poses = self._zeros("scan_poses", (n, KEPT_SCANS), wp.vec3)
         state.measures = self._zeros("measures", (n, len(MEASURES)), float)
         return state
 

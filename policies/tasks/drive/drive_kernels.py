@@ -20,7 +20,8 @@ from policies.tasks.flight.driven_vehicle import RoverArrays, vary_rover
 from policies.tasks.flight.episode_start import Start, ask_for_world, begin_flight
 from policies.tasks.flight.flight_params import FlightParams
 from policies.tasks.flight.flown_vehicle import free_setpoint
-from policies.tasks.flight.reported import attitude_error, reported_estimate, show_late
+from policies.tasks.flight.moved_ranges import Sectors
+from policies.tasks.flight.reported import attitude_error, level_pose, reported_estimate, show_late
 from sim.sensors.ground_ring import ring_ranges
 from sim.truth import Truth
 from sim.world.world import World, obstacle_contact, world_at
@@ -44,6 +45,7 @@ class DriveRules:
     has_estimator: int
     spot_count: int  # in a row of the car park, 0: a course
     decision_s: float
+    sectors: Sectors
 
 
 @wp.struct
@@ -60,6 +62,7 @@ class DriveState:
     attitude_errors: wp.array(dtype=wp.quat)  # of the attitude that is told
     ranges_m: wp.array2d(dtype=float)  # (envs, SECTORS) as they are shown
     scans_m: wp.array3d(dtype=float)  # (envs, KEPT_SCANS, SECTORS) as they were measured, newest first
+    scan_poses: wp.array2d(dtype=wp.vec3)  # (envs, KEPT_SCANS) north, east and heading, by the estimate
     measures: wp.array2d(dtype=float)  # (envs, MEASURES)
 
 
@@ -111,10 +114,11 @@ def show_frame(
     place = wp.vec2(truth.pos_ned[0], truth.pos_ned[1])
     heading = yaw_from_quat(truth.q_ned_from_frd)
     ring_ranges(world_now(rig, i), place, heading, state.params[i].range_noise, rig.seed[i], tick, state.ranges_m, i)
-    show_late(state.params[i].scan_lag_s, is_first, state.scans_m, state.ranges_m, i)
-    own = own_drive(reported_estimate(rig, i, rules.has_estimator, state.attitude_errors))
+    told = reported_estimate(rig, i, rules.has_estimator, state.attitude_errors)
+    scans_m, lag_s = state.scans_m, state.params[i].scan_lag_s
+    show_late(lag_s, is_first, level_pose(told), rules.sectors, scans_m, state.scan_poses, state.ranges_m, i)
     at = open_frame(buffers, i)
-    write_frame(own, state.actions[i], state.goals[i], state.ranges_m, buffers.observations, i, at)
+    write_frame(own_drive(told), state.actions[i], state.goals[i], state.ranges_m, buffers.observations, i, at)
 
 
 @wp.kernel(enable_backward=False)

@@ -1,7 +1,7 @@
 """What a vehicle tells of itself and of what it sees, when that is wrong or late: attitudes with an error, old scans.
 
-Of tasks that are shown ranges. What comes late is shown as it was measured, as in flight too: round where the vehicle
-was then, and from the nose of then.
+Of tasks that are shown ranges. What comes late is shown as it would be from where the vehicle is now, by what it
+estimates that it has moved, as in flight too; what else has moved since is shown where it was.
 """
 
 import math
@@ -11,7 +11,9 @@ import warp as wp
 
 from autopilot.ports import Estimate
 from common.rng import normal3
+from common.rotation import yaw_from_quat
 from policies.tasks.flight.flown_vehicle import vehicle_estimate
+from policies.tasks.flight.moved_ranges import Sectors, move_ranges
 from policies.tasks.task_params import TaskParam
 
 wp.set_module_options({"enable_backward": False})
@@ -51,22 +53,43 @@ def reported_estimate(rig: Any, i: int, has_estimator: int, attitude_errors: wp.
 
 
 @wp.func
+def level_pose(estimate: Estimate) -> wp.vec3:
+    """North, east [m] and heading [rad]."""
+    return wp.vec3(estimate.pos_ned[0], estimate.pos_ned[1], yaw_from_quat(estimate.q_ned_from_frd))
+
+
+@wp.func
 def show_late(
-    lag_s: float, is_first: int, scans_m: wp.array3d(dtype=float), ranges_m: wp.array2d(dtype=float), i: int
+    lag_s: float,
+    is_first: int,
+    pose: wp.vec3,
+    sectors: Sectors,
+    scans_m: wp.array3d(dtype=float),
+    poses: wp.array2d(dtype=wp.vec3),
+    ranges_m: wp.array2d(dtype=float),
+    i: int,
 ) -> None:
-    """Keeps the scan of now and shows that of `lag_s` ago in its place.
+    """Keeps the scan of now and shows that of `lag_s` ago in its place, its sectors as they would be from here.
 
     Args:
         lag_s: how old the ranges are that are shown [s].
         is_first: an episode begins: who takes over has seen something.
+        pose: where the vehicle takes itself to be, see `level_pose`.
+        sectors: which way the ranges look.
         scans_m: the last ones [m], newest first, shape (rows, KEPT_SCANS, ranges).
+        poses: where they were measured, shape (rows, KEPT_SCANS).
         ranges_m: those of now, then those that are shown [m], shape (rows, ranges).
         i: the row.
     """
     late = wp.min(int(wp.round(lag_s / _DECISION_S)), _KEPT_SCANS - 1)
+    for back in range(_KEPT_SCANS - 1, 0, -1):
+        poses[i, back] = wp.where(is_first == 1, pose, poses[i, back - 1])
+    poses[i, 0] = pose
     for k in range(ranges_m.shape[1]):
         newest = ranges_m[i, k]
         for back in range(_KEPT_SCANS - 1, 0, -1):
             scans_m[i, back, k] = wp.where(is_first == 1, newest, scans_m[i, back - 1, k])
         scans_m[i, 0, k] = newest
         ranges_m[i, k] = scans_m[i, late, k]
+    if late > 0:
+        move_ranges(scans_m[i], late, poses[i, late], pose, sectors, ranges_m, i)

@@ -13,8 +13,9 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.kernels import TICK_S
-from common.range_sectors import RANGES
+from common.range_sectors import RANGES, SCANNER
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
+from policies.tasks.flight.moved_ranges import sectors_struct
 from policies.tasks.flight.own_state import ACTIONS, Command
 from policies.tasks.flight.reported import KEPT_SCANS
 from policies.tasks.flight.standing_bank import standing_bank
@@ -143,6 +144,7 @@ class Navigate(FlightTask):
         state.attitude_errors = self._zeros("attitude_errors", n, wp.quat)
         state.ranges_m = self._zeros("ranges_m", (n, RANGES), float)
         state.scans_m = self._zeros("scans_m", (n, KEPT_SCANS, RANGES), float)
+        state.scan_poses = self._zeros("scan_poses", (n, KEPT_SCANS), wp.vec3)
         state.measures = self._zeros("measures", (n, len(MEASURES)), float)
         state.is_all = wp.full(n, value=True, dtype=wp.bool, device=self.device)
         return state
@@ -160,7 +162,8 @@ class Navigate(FlightTask):
         self._act = record(act, buffers, rules, rig, state, commands)
         self._command = record(command, rig, commands)
         reported = (rules.has_estimator, state.attitude_errors)
-        self._scan = record(scan, rig, state.params, state.is_all, *reported, 0, state.scans_m, state.ranges_m)
+        scans = (sectors_struct(SCANNER), state.scans_m, state.scan_poses, state.ranges_m)
+        self._scan = record(scan, rig, state.params, state.is_all, *reported, 0, *scans)
         self._judge = record(judge, buffers, rules, rig, state, start)
         self._prepare = record(prepare, buffers, state, start)
         self._place = record(place, buffers, rig, state, start)

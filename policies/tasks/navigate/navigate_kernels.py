@@ -63,6 +63,7 @@ class NavigateState:
     attitude_errors: wp.array(dtype=wp.quat)  # of the attitude that is told
     ranges_m: wp.array2d(dtype=float)  # (envs, RANGES) as they are shown
     scans_m: wp.array3d(dtype=float)  # (envs, KEPT_SCANS, RANGES) as they were measured, newest first
+    scan_poses: wp.array2d(dtype=wp.vec3)  # (envs, KEPT_SCANS) north, east and heading, by the estimate
     measures: wp.array2d(dtype=float)  # (envs, MEASURES)
     is_all: wp.array(dtype=wp.bool)  # every row
 

@@ -29,6 +29,7 @@ from tests.unit.mission.follow.forest_flight import (
     place,
     send_goto,
 )
+from tests.unit.policies.tasks.flight.moving import moved, pose_of
 
 
 @wp.kernel(enable_backward=False)
@@ -124,18 +125,22 @@ def test_the_companion_sees_what_training_sees():
     flight, companion = hovering()
     goal_ned = place(flight, 45.0, -20.0)
     send_goto(flight, goal_ned, COMPANION)
+    poses = {}
     advance(flight, 4.0)
     while True:  # up to a frame with a decision
         count, action = companion.decision_count, companion.action
+        poses[flight.time_us] = pose_of(flight.rig.rows["autopilot.ekf.rows"][0]["estimate"])
         flight.frame()
         if companion.decision_count > count:
             break
     own = wp.zeros(1, dtype=OwnState)
     wp.launch(read_own, 1, [flight.rig.arrays, own])
     out = wp.zeros((1, len(frame_elements(has_rays=True))), dtype=float)
+    was, now = poses[companion.skill.ranges.taken_us], pose_of(own.numpy()[0])
     scanner = flight._components[0]._scanner
+    ranges = wp.array([moved(scanner._ranges.numpy()[0], was, now)], dtype=float)
     goals, actions = wp.array([goal_ned], dtype=wp.vec3), wp.array([action], dtype=wp.vec4)
-    wp.launch(observe_rows, 1, [1, own, actions, goals, scanner._ranges, out])
+    wp.launch(observe_rows, 1, [1, own, actions, goals, ranges, out])
     newest = companion.skill.seen[-len(out.numpy()[0]) :]
     assert (out.numpy()[0][-52:] > 0.2).sum() > 3  # trees, and the ground ahead
     assert newest == pytest.approx(out.numpy()[0], abs=2e-3)  # centimetres of ranges, of latitudes

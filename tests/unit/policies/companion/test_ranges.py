@@ -146,3 +146,22 @@ def test_a_beam_that_comes_late_is_levelled_by_the_attitude_of_when_it_was_measu
         current_distance=400, min_distance=20, max_distance=REACH_CM,
     )  # fmt: skip
     assert vehicle.ranges.ranges_m[SECTORS:] == pytest.approx([RANGE_M, RANGE_M, 4.0, RANGE_M])
+
+
+def test_a_scan_that_comes_late_is_shown_from_where_the_vehicle_is_now_and_beams_as_they_were_measured():
+    vehicle = Vehicle()
+    for time_ms, north_m in ((1_000, 0.0), (1_200, 1.0)):
+        vehicle.tell("LOCAL_POSITION_NED", time_boot_ms=time_ms, x=north_m)
+        vehicle.tell("ATTITUDE_QUATERNION", time_boot_ms=time_ms, q1=1.0)
+        vehicle.ranges.follow()
+    vehicle.sectors(bins(b24=500), -117.5, time_us=999_999)  # right beside the nose
+    vehicle.beam(-30.0, 400)
+    assert vehicle.ranges.from_here()[24] == pytest.approx(4.0, abs=0.02)
+    assert vehicle.ranges.from_here()[SECTORS:] == pytest.approx(vehicle.ranges.ranges_m[SECTORS:])
+    assert vehicle.ranges.ranges_m[24] == pytest.approx(5.0)  # what was measured stays: the guard has poses of its own
+
+
+def test_a_scan_is_shown_as_it_was_measured_where_nobody_knows_where_that_was():
+    vehicle = Vehicle()
+    vehicle.sectors(bins(b24=500), -117.5)
+    assert vehicle.ranges.from_here()[24] == pytest.approx(5.0)

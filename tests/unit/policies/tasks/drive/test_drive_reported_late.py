@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from common.range_sectors import GROUND_RING
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.drive.drive import Drive
 from policies.tasks.drive.observe import DIRECTIONS, FRAME
+from tests.unit.policies.tasks.flight.moving import moved, pose_of
 
 NAMES = [element.name for element in FRAME]
 CALM = {"wind_m_s": 0.0, "wind_gust_m_s": 0.0, "hill_height_m": 0.0}
@@ -28,6 +30,7 @@ def _seen(task: Drive) -> Seen:
         "frame": task.buffers.observations.numpy()[:, -len(FRAME) :].copy(),
         "measured_m": task.driving.scans_m.numpy()[:, 0].copy(),
         "shown_m": task.driving.ranges_m.numpy().copy(),
+        "poses": np.array([pose_of(row) for row in task.rig.rows["truth"]]),
     }
 
 
@@ -43,7 +46,7 @@ def _driven(task: Drive, decisions: int) -> list[Seen]:
 
 @pytest.mark.parametrize("preset", ["park", "reach"])
 @pytest.mark.parametrize(("lag_s", "late"), [(0.0, 0), (0.1, 1), (0.2, 2), (0.3, 3)])
-def test_policy_sees_the_scan_of_so_many_decisions_ago_and_all_else_of_now(
+def test_policy_sees_the_scan_of_so_many_decisions_ago_from_where_it_is_and_all_else_of_now(
     preset: str, lag_s: float, late: int
 ) -> None:
     fresh, lagged = _driven(_task({}, preset), 6), _driven(_task({"scan_lag_s": lag_s}, preset), 6)
@@ -51,9 +54,14 @@ def test_policy_sees_the_scan_of_so_many_decisions_ago_and_all_else_of_now(
     for k in range(len(fresh)):
         ago = max(k - late, 0)  # the first scan is shown until another comes
         assert np.array_equal(lagged[k]["measured_m"], fresh[k]["measured_m"])
-        assert np.array_equal(lagged[k]["shown_m"], fresh[ago]["measured_m"])
+        for i in range(4):
+            was, now = fresh[ago]["poses"][i], fresh[k]["poses"][i]
+            expected = moved(fresh[ago]["measured_m"][i], was, now, GROUND_RING)
+            np.testing.assert_allclose(lagged[k]["shown_m"][i], expected, atol=1e-3)
         assert np.array_equal(lagged[k]["frame"][:, :-DIRECTIONS], fresh[k]["frame"][:, :-DIRECTIONS])
-        assert np.array_equal(lagged[k]["frame"][:, -DIRECTIONS:], fresh[ago]["frame"][:, -DIRECTIONS:])
+        near = lagged[k]["shown_m"].reshape(4, DIRECTIONS, 2).min(axis=2)
+        nearness = 1.0 - np.sqrt(near / GROUND_RING.range_m)
+        np.testing.assert_allclose(lagged[k]["frame"][:, -DIRECTIONS:], nearness, atol=1e-6)
 
 
 def test_late_scans_of_one_episode_are_not_shown_in_the_next() -> None:
@@ -63,7 +71,7 @@ def test_late_scans_of_one_episode_are_not_shown_in_the_next() -> None:
     scans_m = task.driving.scans_m.numpy()
     assert (scans_m[0] == scans_m[0, :1]).all()
     assert not (scans_m[1] == scans_m[1, :1]).all()
-    assert np.array_equal(task.driving.ranges_m.numpy()[0], scans_m[0, 0])
+    np.testing.assert_allclose(task.driving.ranges_m.numpy()[0], scans_m[0, 0], atol=1e-4)
 
 
 def test_goal_and_tilt_seem_turned_by_the_attitude_that_is_told_wrong_and_ranges_do_not() -> None:

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from common.range_sectors import RANGES
+from common.range_sectors import RANGE_M, RANGES
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.navigate.navigate import Navigate
+from tests.unit.policies.tasks.flight.moving import moved, pose_of
 
 CALM = {"wind_m_s": 0.0, "wind_gust_m_s": 0.0}
 
@@ -35,6 +36,7 @@ def _flown(task: Navigate, decisions: int) -> list[dict[str, NDArray[Any]]]:
                 "observation": task.buffers.observations.numpy().copy(),
                 "measured_m": state.scans_m.numpy()[:, 0].copy(),
                 "shown_m": state.ranges_m.numpy().copy(),
+                "poses": np.array([pose_of(row) for row in task.rig.rows["truth"]]),
             }
         )
     return seen
@@ -42,16 +44,22 @@ def _flown(task: Navigate, decisions: int) -> list[dict[str, NDArray[Any]]]:
 
 @pytest.mark.parametrize("name", ["Navigate", "NavigateRover"])
 @pytest.mark.parametrize(("lag_s", "late"), [(0.0, 0), (0.1, 1), (0.2, 2), (0.3, 3)])
-def test_policy_sees_the_scan_of_so_many_decisions_ago_and_all_else_of_now(name: str, lag_s: float, late: int) -> None:
+def test_policy_sees_the_scan_of_so_many_decisions_ago_from_where_it_is_and_all_else_of_now(
+    name: str, lag_s: float, late: int
+) -> None:
     fresh, lagged = _flown(_task({}, name), 6), _flown(_task({"scan_lag_s": lag_s}, name), 6)
     for k in range(len(fresh)):
         ago = max(k - late, 0)  # the first scan is shown until another comes
         assert np.array_equal(lagged[k]["measured_m"], fresh[k]["measured_m"])
-        assert np.array_equal(lagged[k]["shown_m"], fresh[ago]["measured_m"])
+        for i in range(2):
+            was, now = fresh[ago]["poses"][i], fresh[k]["poses"][i]
+            expected = moved(fresh[ago]["measured_m"][i], was, now)
+            np.testing.assert_allclose(lagged[k]["shown_m"][i], expected, atol=1e-3)
         own_now, own_lagged = (seen[k]["observation"][:, -RANGES - 17 : -RANGES] for seen in (fresh, lagged))
         assert np.array_equal(own_now, own_lagged)
-        ranges_ago, ranges_lagged = fresh[ago]["observation"][:, -RANGES:], lagged[k]["observation"][:, -RANGES:]
-        assert np.array_equal(ranges_ago, ranges_lagged)
+        nearness = 1.0 - lagged[k]["shown_m"] / RANGE_M
+        np.testing.assert_allclose(lagged[k]["observation"][:, -RANGES:], nearness, atol=1e-6)
+    assert np.abs(np.diff([seen["poses"] for seen in fresh], axis=0)).max() > 0.05  # else nothing was to be moved
 
 
 def test_late_scans_of_one_episode_are_not_shown_in_the_next() -> None:
@@ -62,7 +70,7 @@ def test_late_scans_of_one_episode_are_not_shown_in_the_next() -> None:
     scans_m = state.scans_m.numpy()
     assert (scans_m[0] == scans_m[0, :1]).all()
     assert not (scans_m[1] == scans_m[1, :1]).all()
-    assert np.array_equal(state.ranges_m.numpy()[0], scans_m[0, 0])
+    np.testing.assert_allclose(state.ranges_m.numpy()[0], scans_m[0, 0], atol=1e-4)
 
 
 def test_attitude_that_is_told_is_off_by_the_error_about_another_axis_in_each_episode() -> None:
