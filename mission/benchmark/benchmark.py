@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 TASKS = {
     "follow": ("mission.follow.benchmark.following", "follow-me-tracked"),
-    "navigate": ("mission.benchmark.navigating", "navigate-late"),
+    "navigate": ("mission.benchmark.navigating", "navigate"),
     "park": ("mission.benchmark.parking", "drive-park"),
 }
 """By the name on the command line: the module whose BENCHMARK it is, and the policy that is judged if none is named."""

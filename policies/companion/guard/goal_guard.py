@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from common.attitude import rotated, yaw_of
 from common.range_sectors import RangeLayout
-from policies.companion.guard.interventions import HEIGHT, NEAR_SOMETHING, TOO_FAST, Interventions
+from policies.companion.guard.interventions import HEIGHT, NEAR_SOMETHING, TILTED, TOO_FAST, Interventions
 from policies.companion.guard.limits import (
     braking_speed,
     faded,
+    is_tilted,
     stopping_speed,
     way_along_m,
     within_heights,
@@ -123,6 +124,9 @@ class GoalGuard:
         kept = scale * level
         kept *= min(1.0, min(most, self.settings.speed_max) / max(float(np.hypot(*kept)), 1e-6))
         self._count(TOO_FAST if self.stance is GoalStance.FREE else self.stance.value, level, kept)
+        if is_tilted(own.q_ned_from_frd, self.settings):
+            kept = np.zeros(2) if self._drives else np.array(own.vel_ned[:2])  # asks for no more tilt
+            self.interventions.note(TILTED)
         return self._bounded(kept, scale * velocity[2], yaw_rate, own, age_s)
 
     def begin(self, own: Own) -> None:

@@ -13,14 +13,16 @@ from numpy.typing import NDArray
 
 from common.attitude import wrapped, yaw_of
 from policies.companion.guard.interventions import (
+    HEIGHT,
     NEAR_SOMEBODY,
     NEAR_SOMETHING,
     NO_DEPTH,
     OVER_OWNER,
     OVER_SOMEBODY,
+    TILTED,
     Interventions,
 )
-from policies.companion.guard.limits import CLIMB_M_S, faded, stopping_speed, within_heights
+from policies.companion.guard.limits import CLIMB_M_S, faded, is_tilted, stopping_speed, within_heights
 from policies.companion.guard.people import PeopleRule, Somebody
 from policies.companion.guard.rollouts import Rollouts
 from policies.companion.guard.settings import GuardSettings
@@ -51,6 +53,7 @@ class Stance(Enum):
     STOP = "holding: the owner is not seen"
     SEARCH = "searching the owner"
     BLIND = "holding: old pictures"
+    LATE = "slower: old pictures"
 
 
 class Guard:
@@ -113,6 +116,9 @@ class Guard:
             level, down = scale * level, scale * down
             yaw_rate = self._facing_owner(own, yaw_rate)
             self.interventions.note(self.stance.value)
+        if is_tilted(own.q_ned_from_frd, s):
+            level = np.array(own.vel_ned[:2])  # asks for no more tilt
+            self.interventions.note(TILTED)
         let_be, people = self._past_people(level, own)
         level = self._flown = self._past_solids(let_be, own, people)
         taken = let_be - level
@@ -129,7 +135,9 @@ class Guard:
             return Stance.SEARCH
         if silence_s > s.stop_s:
             return Stance.STOP
-        return Stance.SLOW if silence_s > s.slow_s or age_s > s.image_slow_s else Stance.FREE
+        if silence_s > s.slow_s:
+            return Stance.SLOW
+        return Stance.LATE if age_s > s.image_slow_s else Stance.FREE
 
     @property
     def _is_among_others(self) -> bool:
@@ -236,11 +244,14 @@ class Guard:
             down = min(down, 0.0)
         if down - self._sinking_max > _COUNTED_M_S:
             self.interventions.note(OVER_SOMEBODY)
-        down = min(down, self._sinking_max)
+        down = allowed = min(down, self._sinking_max)
         room_m = self.senses.map.room_up_m(own.pos_ned, own.boot_us) - s.crown_m
         if isfinite(room_m):
             down = max(down, -stopping_speed(room_m, s.reaction_s, CLIMB_M_S))
-        return within_heights(down, own.range_m, s)
+        kept = within_heights(down, own.range_m, s)
+        if abs(kept - allowed) > _COUNTED_M_S:
+            self.interventions.note(HEIGHT)
+        return kept
 
     def _count(self, why: str, wanted: Floats, kept: Floats) -> None:
         if float(np.hypot(*(wanted - kept))) > _COUNTED_M_S:

@@ -1,10 +1,11 @@
 """How fast it may go: towards the owner, towards what is solid or unseen, up and down. Pure functions."""
 
-from math import isfinite, sqrt
+from math import cos, isfinite, radians, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from common.attitude import Quat, rotated
 from policies.companion.guard.settings import GuardSettings
 
 Floats = NDArray[np.float64]
@@ -71,6 +72,11 @@ def within_heights(down: float, height_m: float, s: GuardSettings) -> float:
         return max(down, SINK_M_S)
     down = max(down, -stopping_speed(s.height_max_m - height_m, s.reaction_s, CLIMB_M_S))
     return min(down, stopping_speed(height_m - s.height_min_m, s.reaction_s, CLIMB_M_S))
+
+
+def is_tilted(q_ned_from_frd: Quat, s: GuardSettings) -> bool:
+    """Whether a vehicle leans by more than it may."""
+    return rotated(q_ned_from_frd, (0.0, 0.0, 1.0))[2] < cos(radians(s.tilt_max_deg))
 
 
 def faded(age_s: float, from_s: float, to_s: float) -> float:

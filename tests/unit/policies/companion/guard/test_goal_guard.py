@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
+from common.attitude import quat_of
 from common.range_sectors import GROUND_RING, SCANNER, RangeLayout
 from policies.companion.guard.goal_guard import GoalGuard, GoalStance, NoseGuard
+from policies.companion.guard.interventions import TILTED
 from policies.companion.guard.limits import way_along_m
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.ranges import Ranges
@@ -243,3 +245,14 @@ def test_who_stands_too_near_already_may_leave_and_come_no_nearer() -> None:
     wall = np.stack([np.full(41, S.hull_half_length_m + 0.02), np.linspace(-1.0, 1.0, 41)], -1)
     assert way_along_m(wall, 0.0, False, S) < 0.05
     assert way_along_m(wall, 0.0, True, S) == 4.0
+
+
+@pytest.mark.parametrize(("drives", "kept"), [(False, 4.0), (True, 0.0)])
+def test_who_leans_too_far_is_asked_to_go_on_as_it_does_or_to_stand_if_it_drives(drives: bool, kept: float) -> None:
+    approach = Approach(GoalGuard(S, drives=drives), SCANNER, 100.0, 0.0)
+    approach.fly(3.0, ((4.0, 0.0, 0.0), 0.0))
+    assert TILTED not in approach.guard.interventions
+    approach.own.q_ned_from_frd = quat_of(0.0, radians(-S.tilt_max_deg - 5.0))
+    (level, _, _), _ = approach.guard.filtered(FULL_SPEED, approach.own)
+    assert level == pytest.approx(kept, abs=0.1)
+    assert approach.guard.interventions[TILTED] == 1

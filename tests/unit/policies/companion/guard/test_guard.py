@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from common.attitude import quat_of
 from common.image_stream import ImageFrame
 from policies.companion.guard.guard import Guard, Stance
+from policies.companion.guard.interventions import HEIGHT, TILTED
 from policies.companion.guard.settings import GuardSettings, guard_settings
 from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
@@ -75,6 +77,42 @@ def test_images_that_stop_stop_the_vehicle(scene: tuple[Guard, Own, Sees]) -> No
         velocity, _ = guard.filtered(((3.0, 0.0, 0.0), 0.0), own)
     assert velocity[:2] == (0.0, 0.0)
     assert guard.stance is Stance.BLIND
+
+
+def test_pictures_that_get_old_are_said_to_be_what_makes_it_slower(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, _ = scene
+    full = flown(guard, own, 1.0)[-1]
+    own.boot_us += 650_000
+    guard.senses.sense(own, Owner(), None)
+    assert 0.0 < guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[0][0] < full
+    assert guard.stance is Stance.LATE
+    assert "slower: old pictures" in guard.interventions.latest
+
+
+def test_who_leans_too_far_is_asked_to_go_on_as_it_does(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, _ = scene
+    flown(guard, own, 1.0)
+    own.vel_ned = (0.4, 0.0, 0.0)
+    own.q_ned_from_frd = quat_of(0.0, np.radians(-guard.settings.tilt_max_deg - 5.0))
+    assert guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[0][0] == pytest.approx(0.4, abs=0.05)
+    assert TILTED in guard.interventions.latest
+    own.q_ned_from_frd = quat_of(0.0, np.radians(-guard.settings.tilt_max_deg + 5.0))
+    assert guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[0][0] > 0.8
+    assert TILTED not in guard.interventions.latest
+
+
+@pytest.mark.parametrize(("height_m", "down"), [(3.4, -2.0), (1.1, 2.0), (0.8, 0.0)])
+def test_a_height_that_it_does_not_let_be_flown_is_a_reason(
+    scene: tuple[Guard, Own, Sees], height_m: float, down: float
+) -> None:
+    guard, own, _ = scene
+    flown(guard, own, 1.0)
+    guard.filtered(((0.0, 0.0, 0.0), 0.0), own)
+    assert HEIGHT not in guard.interventions.latest
+    own.range_m = height_m
+    kept = guard.filtered(((0.0, 0.0, down), 0.0), own)[0][2]
+    assert abs(kept - down) > 0.29
+    assert HEIGHT in guard.interventions.latest
 
 
 def test_an_owner_who_was_never_seen_is_looked_for_before_it_is_the_end(scene: tuple[Guard, Own, Sees]) -> None:
