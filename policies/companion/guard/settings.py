@@ -114,7 +114,7 @@ class GuardSettings(BaseModel):
     height_max_m: float = Field(default=3.5, gt=0.0, le=100.0)
     """Above the ground: higher it does not climb; crowns begin soon after."""
     tilt_max_deg: float = Field(default=50.0, gt=0.0, le=90.0)
-    """Tilted by more it is asked to go on as it does, or to stand if it drives, until it is not; autopilots tilt to 45."""
+    """Tilted by more it is asked to go on as it does, or to stand if it drives; autopilots tilt to 45."""
     speed_max: float = Field(default=7.5, gt=0.0, le=20.0)
     """[m/s] level, of whoever goes to goals; policies ask for 7."""
     scan_slow_s: float = Field(default=0.4, gt=0.0, le=IMAGES_S)

@@ -48,6 +48,7 @@ class FollowParams:
     depth_holes: float
     lens_scale: float
     lens_tilt_deg: float
+    lens_distortion: float
     image_lag_s: float
     image_jitter_s: float
     image_loss: float
@@ -126,6 +127,7 @@ FOLLOW_PARAMS = (
     TaskParam("depth_holes", 0.0, 0.0, 1.0, "1", "fraction of the picture without depth, in patches", "guess"),
     TaskParam("lens_scale", 1.0, 0.9, 1.1, "1", "factor on the width of what the lens shows", "guess"),
     TaskParam("lens_tilt_deg", 0.0, -5.0, 5.0, "deg", "of the camera's mount, up, unknown to the policy", "guess"),
+    TaskParam("lens_distortion", 0.0, -0.15, 0.15, "1", "of a lens that bends lines; above 0 a barrel", "guess"),
     TaskParam("image_lag_s", 0.0, 0.0, 0.5, "s", "from shutter to policy; in training in steps of 0.1 s", "guess"),
     TaskParam("image_jitter_s", 0.0, 0.0, 0.3, "s", "at most this much more, of each picture anew", "guess"),
     TaskParam("image_loss", 0.0, 0.0, 0.9, "1", "fraction of pictures that never come", "guess"),
@@ -226,13 +228,14 @@ SEEN_BY_TRACKER: dict[str, float | Sampler] = {
     "sensor_roughness": Sampler(intervals=((0.0, 1.0),)),
     "lens_scale": Sampler(mean=1.0, st_dev=0.02),
     "lens_tilt_deg": Sampler(mean=0.0, st_dev=1.5),
+    "lens_distortion": Sampler(mean=0.0, st_dev=0.03),
     "owner_size": Sampler(intervals=((0.65, 1.15),)),
     "owner_crouch_fraction": Sampler(mean=0.0, st_dev=0.3),
     "owner_stop_share": Sampler(intervals=((0.1, 0.35),)),
     "owner_course_std_deg": Sampler(intervals=((40.0, 70.0), (40.0, 70.0), (60.0, 120.0))),
     "owner_hides_per_min": Sampler(mean=0.2, st_dev=1.5),
     "owner_hide_s": Sampler(intervals=((0.3, 1.9),)),
-    "bystanders": Sampler(mean=0.0, st_dev=0.8),
+    "bystanders": Sampler(intervals=((0.0, 0.4), (0.0, 0.4), (0.5, 3.0))),  # one to three of them in a third
     "start_distance_min_m": 1.5,
     "start_distance_max_m": Sampler(intervals=((3.0, 5.0), (3.0, 8.0))),
     "image_lag_s": Sampler(intervals=((0.0, 0.1), (0.0, 0.35))),

@@ -51,6 +51,7 @@ def set_optics(
         out.has_depth_limit = 1
         out.depth_max_m = n.depth_max_m
         out.depth_holes = n.depth_holes
+        out.distortion = n.lens_distortion
         out.shutter_s = n.shutter_s
         if n.shutter_s > 0.0:
             truth = rig.truth[i]

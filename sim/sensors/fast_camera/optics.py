@@ -1,4 +1,4 @@
-"""What a camera adds to a perfect image: noise of its sensor and its depth, and the smear of what moves meanwhile.
+"""What a camera adds to a perfect image: noise of sensor and depth, smear of what moves, a lens that bends lines.
 
 In: perfect images, and per camera an `Optics` that kernels write before each. Out: the images as they are handed
 on. Exposure and white balance belong to the `Lens`. Draws are named by a camera's seed and tick and the pixel.
@@ -38,6 +38,7 @@ class Optics:
     shutter_s: float  # time in which what moves is smeared; 0 smears nothing
     vel_rdf: wp.vec3  # [m/s] of the camera, while the shutter is open
     rate_rdf: wp.vec3  # [rad/s]
+    distortion: float  # see `undistorted`
     seed: int
     tick: int
 
@@ -57,7 +58,8 @@ def sensor_noise(optics: Optics, scale: float, seed: int, tick: int) -> Optics:
 def is_perfect(optics: Optics) -> bool:
     """Whether the camera neither errs nor smears."""
     noise = optics.read_std + optics.shot_std + optics.depth_std_fraction
-    return noise + optics.shutter_s + optics.depth_holes == 0.0 and optics.has_depth_limit == 0
+    bends = wp.abs(optics.distortion)
+    return noise + optics.shutter_s + optics.depth_holes + bends == 0.0 and optics.has_depth_limit == 0
 
 
 @wp.func
@@ -92,6 +94,17 @@ def smear(optics: Optics, x: float, y: float, depth_m: float, per_pixel: float) 
 
 
 @wp.func
+def undistorted(distortion: float, place: wp.vec2) -> wp.vec2:
+    """Where a lens that bends nothing shows what this one shows at a place: Brown's first radial term.
+
+    Args:
+        distortion: [1] above 0 a barrel, below a cushion; the middles of the edges stay where they are.
+        place: from the image's middle, in halves of its width.
+    """
+    return place * ((1.0 + distortion * wp.dot(place, place)) / (1.0 + distortion))
+
+
+@wp.func
 def between(rgb: wp.array[wp.uint8], first: int, size: wp.vec2i, row: float, column: float) -> wp.vec3:
     """Levels between four pixels of the image that begins at an index; those of its edge beyond it."""
     v = wp.clamp(row, 0.0, float(size[1]) - 1.001)
@@ -114,13 +127,13 @@ def levels_of(rgb: wp.array[wp.uint8], k: int) -> wp.vec3:
 
 
 @wp.func
-def smeared(rgb: wp.array[wp.uint8], first: int, size: wp.vec2i, row: int, column: int, way: wp.vec2) -> wp.vec3:
-    """Mean level along the way of a pixel."""
+def smeared(rgb: wp.array[wp.uint8], first: int, size: wp.vec2i, row: float, column: float, way: wp.vec2) -> wp.vec3:
+    """Mean level along the way of a place."""
     levels = wp.vec3()
     taps = wp.min(int(wp.length(way)) + 2, _TAPS_MAX)
     for tap in range(taps):
         fraction = (float(tap) + 0.5) / float(taps) - 0.5
-        levels = levels + between(rgb, first, size, float(row) + fraction * way[1], float(column) + fraction * way[0])
+        levels = levels + between(rgb, first, size, row + fraction * way[1], column + fraction * way[0])
     return levels / float(taps)
 
 
@@ -143,7 +156,6 @@ def expose(
     optics = all_optics[i_camera]
     state = draw_key(optics.seed, row, optics.tick, CAMERA)
     per_pixel = 2.0 * lenses[i_camera].half_width / float(size[0])
-    y = (float(row) + 0.5 - 0.5 * float(size[1])) * per_pixel
     first_pixel = i_camera * size[0] * size[1]
     if is_perfect(optics):
         for k in range(first_pixel + row * size[0], first_pixel + (row + 1) * size[0]):
@@ -151,15 +163,26 @@ def expose(
                 rgb[3 * k + c] = perfect_rgb[3 * k + c]
             depth_m[k] = perfect_depth_m[k]
         return
+    half = 0.5 * float(size[0])
+    middle = wp.vec2(half - 0.5, 0.5 * float(size[1]) - 0.5)
     for column in range(size[0]):
         k = first_pixel + row * size[0] + column
-        depth = perfect_depth_m[k]
-        levels = levels_of(perfect_rgb, 3 * k)
+        at = wp.vec2(float(column), float(row))  # of what is shown there
+        shown = k
+        if optics.distortion != 0.0:
+            at = undistorted(optics.distortion, (at - middle) / half) * half + middle
+            nearest_row = wp.clamp(int(wp.round(at[1])), 0, size[1] - 1)
+            nearest_column = wp.clamp(int(wp.round(at[0])), 0, size[0] - 1)
+            shown = first_pixel + nearest_row * size[0] + nearest_column
+        depth = perfect_depth_m[shown]
+        levels = levels_of(perfect_rgb, 3 * shown)
+        if optics.distortion != 0.0:
+            levels = between(perfect_rgb, first_pixel, size, at[1], at[0])
         if optics.shutter_s > 0.0:
-            x = (float(column) + 0.5 - 0.5 * float(size[0])) * per_pixel
-            way = smear(optics, x, y, depth, per_pixel)
+            off = (at - middle) * per_pixel
+            way = smear(optics, off[0], off[1], depth, per_pixel)
             if wp.dot(way, way) > _STILL_SQUARED:
-                levels = smeared(perfect_rgb, first_pixel, size, row, column, way)
+                levels = smeared(perfect_rgb, first_pixel, size, at[1], at[0], way)
         bits = wp.randu(state)
         read = optics.read_std * optics.read_std
         shot = optics.shot_std * optics.shot_std * (1.0 / 255.0)

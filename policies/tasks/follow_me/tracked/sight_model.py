@@ -5,6 +5,7 @@ picture would have been, the filter fed with those that have come, and what a ma
 on flights with the real chain (docs/explanation/following.md).
 """
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -16,7 +17,8 @@ from policies.tasks.flight.flown_vehicle import own_state
 from policies.tasks.flight.own_state import Command, ned_from_level
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.image_way import Way
-from policies.tasks.follow_me.owner_visibility import Sight
+from policies.tasks.follow_me.observe import TILT_DEG
+from policies.tasks.follow_me.owner_visibility import HALF_WIDTH, Sight
 from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, seen, waited
 from policies.tasks.follow_me.tracked.vector import REACH_M, SECTORS
 from sim.advance import RigArrays
@@ -34,6 +36,7 @@ _ALONG_BIAS_M = wp.constant(0.05)  # standard deviation from episode to episode,
 _ALONG_M, _ALONG_FRACTION = wp.constant(0.045), wp.constant(0.01)
 _COLOUR_BIAS, _COLOUR_FRACTION = wp.constant(0.12), wp.constant(0.13)  # of the range by colours alone
 _RADIANS = wp.constant(0.0174532925)
+_TILT = wp.constant(math.tan(math.radians(-TILT_DEG)))  # of the camera, down, per metre ahead
 _ACROSS_RAD, _ACROSS_BIAS_RAD = wp.constant(0.016), wp.constant(0.01)
 _DOWN_BIAS_M, _DOWN_M = wp.constant(0.1), wp.constant(0.09)
 _MISS = wp.constant(0.01)
@@ -126,6 +129,12 @@ def sight_drawn(
     down = _DOWN_BIAS_M * wp.randn(fixed) + _DOWN_M * wp.randn(state)
     aside += p[1] * (1.0 / n.lens_scale - 1.0)  # where a lens shows them that is taken for the usual one
     down += level_m * wp.tan(n.lens_tilt_deg * _RADIANS)
+    if n.lens_distortion != 0.0:
+        below = p[2] - level_m * _TILT
+        off = wp.vec2(p[1], below) / (level_m * HALF_WIDTH)  # from the image's middle, in halves of its width
+        farther = (1.0 + n.lens_distortion) / (1.0 + n.lens_distortion * wp.dot(off, off)) - 1.0
+        aside += p[1] * farther
+        down += below * farther
     out = p * (1.0 + wp.max(along / level_m, -0.5)) + wp.vec3(-p[1] / level_m * aside, p[0] / level_m * aside, down)
     if wp.randf(state) < _STRAY:
         out += wp.vec3(_STRAY_M * wp.randn(state), _STRAY_M * wp.randn(state), 0.0)

@@ -1,3 +1,4 @@
+import cv2
 import numpy as np
 import pytest
 
@@ -73,3 +74,28 @@ def test_what_is_near_is_smeared_by_flight_and_the_sky_is_not():
     kind, depth = clear.kind.numpy()[0], clear.depth_m.numpy()[0]
     assert change[(kind == GROUND) & (depth < 6.0)].mean() > 2.0
     assert change[kind == SKY].max() <= 1.0
+
+
+@pytest.mark.parametrize("distortion", [-0.1, 0.1])
+def test_a_lens_that_bends_lines_shows_what_opencv_makes_of_the_perfect_image(distortion):
+    bent, clear = rendered(distortion=distortion), perfect()
+    rgb, depth_m = clear.rgb.numpy()[0], clear.depth_m.numpy()[0]
+    half = 0.5 * rgb.shape[0]
+    v, u = (np.indices(rgb.shape[:2], dtype=np.float32) - (half - 0.5)) / half
+    bends = (1.0 + distortion * (u * u + v * v)) / (1.0 + distortion) * half
+    maps = [(axis * bends + half - 0.5).astype(np.float32) for axis in (u, v)]
+    edge = cv2.BORDER_REPLICATE
+    shown = cv2.remap(rgb, *maps, cv2.INTER_LINEAR, borderMode=edge)
+    near = cv2.remap(depth_m, *maps, cv2.INTER_NEAREST, borderMode=edge)
+    assert np.abs(bent.rgb.numpy()[0].astype(int) - shown).max() <= 8  # its weights are of 5 bits
+    assert (bent.depth_m.numpy()[0] == near).mean() > 0.99
+    assert (bent.depth_m.numpy()[0] != depth_m).mean() > 0.2
+
+
+def test_a_barrel_shows_what_is_between_middle_and_edge_farther_out_and_the_edge_as_it_is():
+    clear, barrel = perfect().depth_m.numpy()[0], rendered(distortion=0.15).depth_m.numpy()[0]
+    size = len(clear)
+    for row in (0, size - 1):  # the middles of the upper and the lower edge
+        assert barrel[row, size // 2] == pytest.approx(clear[row, size // 2], rel=0.05)
+    horizon = [int(np.argmax(image[:, size // 2] < 1e3)) for image in (clear, barrel)]  # a little above the middle
+    assert horizon[1] <= horizon[0]

@@ -16,6 +16,7 @@ def sights(**numbers):
         {
             "lens_tilt_deg": 0.0,
             "lens_scale": 1.0,
+            "lens_distortion": 0.0,
             "owner_size": 1.0,
             "owner_hides_per_min": 0.0,
             "bystanders": 0.0,
@@ -46,3 +47,14 @@ def test_a_wider_lens_shows_people_nearer_to_the_middle():
     aside = np.abs(usual[:, 1]) > 0.3
     assert aside.sum() > 4
     assert np.all(np.abs(wider[aside, 1]) < np.abs(usual[aside, 1]))
+
+
+def test_a_barrel_shows_people_between_middle_and_edge_farther_out_and_a_cushion_nearer():
+    usual, barrel, cushion = sights(), sights(lens_distortion=0.15), sights(lens_distortion=-0.15)
+    aside = np.abs(usual[:, 1])
+    level_m = np.hypot(usual[:, 0], usual[:, 1])
+    below = usual[:, 2] - level_m * np.tan(np.radians(10.0))  # the camera looks down
+    between = (aside > 0.3) & (np.hypot(aside, below) < 0.7 * level_m)  # it shows a metre to each side per metre ahead
+    assert between.sum() > 4
+    assert np.all(np.abs(barrel[between, 1]) > aside[between])
+    assert np.all(np.abs(cushion[between, 1]) < aside[between])
