@@ -2,9 +2,10 @@
 
 Stages that are done (results/follow/STAGE-SEED.json) are kept and stopped ones go on; `--again` trains them anew,
 `--page` only writes the page, `--shipped` takes what the shipped page was made of (docs/results/follow.jsonl) as done.
-Policies stay in results/follow/; `--publish` puts those of the first seed in the place of those that ship, without
-asking whether they are better: look at the page first. Two processes go side by side, each on a core of its own; a
-stage waits for those it needs, and one that takes several cores for all others to end.
+Policies stay in results/follow/; `--publish` puts them in the place of those that ship: of several seeds of a stage the
+one that is best in worlds of validation (`bench.follow.choice`). Whether it is better than what it takes the place of is
+not asked: look at the page first. Two processes go side by side, each on a core of its own; a stage waits for those it
+needs, and one that takes several cores for all others to end.
 """
 
 import shutil
@@ -17,6 +18,7 @@ import typer
 from rich.console import Console
 
 from bench.cars.page import DOCS
+from bench.follow.choice import best_of
 from bench.follow.page import write_page
 from bench.follow.result import Result, read, read_all, write, write_all
 from bench.follow.run import policy_path, result_path
@@ -38,7 +40,7 @@ def main(
     page: Annotated[bool, typer.Option("--page", help="Train nothing, only write the page.")] = False,
     shipped: Annotated[bool, typer.Option("--shipped", help="Take the shipped page's results as done.")] = False,
     publish: Annotated[
-        bool, typer.Option("--publish", help="Put the first seed's policies in the place of those that ship.")
+        bool, typer.Option("--publish", help="Put the best seeds' policies in the place of those that ship.")
     ] = False,
 ) -> None:
     unknown = [name for name in names or () if name not in STAGES]
@@ -84,29 +86,30 @@ def _fetch(result: Result) -> None:
 
 
 def published(results_folder: Path, pretrained: Path) -> list[str]:
-    """Puts the first seed's policies among those that ship, under the names of their recipes; says which."""
+    """Puts the best seeds' policies among those that ship, under the names of their recipes; says which."""
     lines = []
     for trained, ships in _new(results_folder, pretrained):
-        write_whole(ships, trained.read_bytes())
-        lines.append(f"{ships.name}: ships now what lies in {trained}")
+        best = trained[0] if len(trained) == 1 else best_of(trained)
+        write_whole(ships, best.read_bytes())
+        lines.append(f"{ships.name}: ships now what lies in {best}")
     return lines
 
 
 def unpublished(results_folder: Path, pretrained: Path) -> list[str]:
     """A line for each of these policies that is another than the one that ships, which stays."""
     new = _new(results_folder, pretrained)
-    return [f"{trained}: is another than {ships.name}, which still ships: --publish" for trained, ships in new]
+    return [f"{', '.join(map(str, trained))}: not {ships.name}, which still ships: --publish" for trained, ships in new]
 
 
-def _new(results_folder: Path, pretrained: Path) -> list[tuple[Path, Path]]:
-    """The first seed's policies of stages that ship, and the files that they would be in the place of."""
-    stages = [stage for stage in STAGES.values() if stage.ships]
-    pairs = [(policy_path(results_folder, stage.name, 1), pretrained / f"{stage.recipe}.pt") for stage in stages]
-    return [
-        (trained, ships)
-        for trained, ships in pairs
-        if trained.exists() and not (ships.exists() and ships.read_bytes() == trained.read_bytes())
-    ]
+def _new(results_folder: Path, pretrained: Path) -> list[tuple[list[Path], Path]]:
+    """The policies of all seeds of stages of which none ships, and the files that one would take the place of."""
+    found = []
+    for stage in (stage for stage in STAGES.values() if stage.ships):
+        trained = sorted(results_folder.glob(f"{stage.name}-[0-9]*.pt"))
+        ships = pretrained / f"{stage.recipe}.pt"
+        if trained and not (ships.exists() and ships.read_bytes() in [path.read_bytes() for path in trained]):
+            found.append((trained, ships))
+    return found
 
 
 def _jobs(names: Sequence[str], seeds: int) -> list[Job]:

@@ -6,7 +6,7 @@ guard's rule of the owner. The episodes, of split `validation`, are not flown in
 that split.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -24,12 +24,13 @@ from policies.tasks.follow_me.settings import FollowSettings
 from policies.tasks.task_params import Sampler
 
 WIDE = "x500+f450+f550"
+EPISODES = 256  # of each policy
 
 
 def main(
     policies: list[Path],
     airframe: Annotated[str, typer.Option(help="Of several with + between them one is drawn per episode.")] = WIDE,
-    episodes: Annotated[int, typer.Option(min=2, help="Of each policy.")] = 256,
+    episodes: Annotated[int, typer.Option(min=2, help="Of each policy.")] = EPISODES,
     drawn_as: Annotated[Path | None, typer.Option(help="Conditions: as this policy's training drew them.")] = None,
 ) -> None:
     numbers = load_policy(drawn_as)[1].samplers() if drawn_as is not None else {}
@@ -50,6 +51,11 @@ def judged(path: Path, airframe: str, episodes: int, numbers: Mapping[str, Sampl
     task.layout.require(policy.layout, str(path))
     tracks, _ = first_episodes(policy, task, numbers)
     return scorecard(tracks)
+
+
+def best_of(paths: Sequence[Path], episodes: int = EPISODES) -> Path:
+    """The one whose interval of the time in the band begins highest."""
+    return max(paths, key=lambda path: judged(path, WIDE, episodes, {}).in_band.low)
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ class Stage:
     reward: str = "ours"  # or the document's: they cannot be compared
     takes_all: bool = False  # its training is given all cores
     flies: bool = False  # also judged in flights over MAVLink
-    ships: bool = True  # with --publish the first seed's policy goes to policies/pretrained/
+    ships: bool = True  # with --publish the best seed's policy goes to policies/pretrained/
     document: str = "not reported"
     limit_s: float | None = None  # wall clock at most, with all stages before it
     figure: str = "in_band"  # of the scorecard, that the targets are of

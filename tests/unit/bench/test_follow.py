@@ -75,15 +75,32 @@ def test_policies_that_ship_stay_unless_new_ones_are_published(tmp_path):
     ships.mkdir()
     (ships / "follow-me.pt").write_bytes(b"old")
     (ships / "follow-me-vision.pt").write_bytes(b"same")
-    for name, content in (("student-1", b"new"), ("vision-only-1", b"same"), ("tuned-1", b"no"), ("student-2", b"no")):
+    for name, content in (
+        ("student-1", b"new"),
+        ("vision-only-1", b"no"),
+        ("tuned-1", b"no"),
+        ("vision-only-2", b"same"),
+    ):
         (results / f"{name}.pt").write_bytes(content)
     (line,) = unpublished(results, ships)
-    assert line == f"{results / 'student-1.pt'}: is another than follow-me.pt, which still ships: --publish"
+    assert line == f"{results / 'student-1.pt'}: not follow-me.pt, which still ships: --publish"
     assert (ships / "follow-me.pt").read_bytes() == b"old"
     assert len(published(results, ships)) == 1
     assert (ships / "follow-me.pt").read_bytes() == b"new"
     assert {path.name for path in ships.iterdir()} == {"follow-me.pt", "follow-me-vision.pt"}
     assert not unpublished(results, ships)
+
+
+def test_of_several_seeds_the_best_is_published(tmp_path, monkeypatch):
+    (tmp_path / "pretrained").mkdir()
+    for seed in (1, 2, 3):
+        (tmp_path / f"student-{seed}.pt").write_bytes(str(seed).encode())
+    (tmp_path / "tracked-student-1.pt").write_bytes(b"of another stage, which does not ship")
+    asked = []
+    monkeypatch.setattr("bench.follow.__main__.best_of", lambda paths: asked.extend(paths) or paths[1])
+    published(tmp_path, tmp_path / "pretrained")
+    assert [path.name for path in asked] == ["student-1.pt", "student-2.pt", "student-3.pt"]
+    assert (tmp_path / "pretrained" / "follow-me.pt").read_bytes() == b"2"
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(90.0, "90 s"), (900.0, "15.0 min"), (7200.0, "2.0 h")])
