@@ -3,9 +3,9 @@
 Stages that are done (results/follow/STAGE-SEED.json) are kept and stopped ones go on; `--again` trains them anew,
 `--page` only writes the page, `--shipped` takes what the shipped page was made of (docs/results/follow.jsonl) as done.
 Policies stay in results/follow/; `--publish` puts them in the place of those that ship: of several seeds of a stage the
-one that is best in worlds of validation (`bench.follow.choice`). Whether it is better than what it takes the place of is
-not asked: look at the page first. Two processes go side by side, each on a core of its own; a stage waits for those it
-needs, and one that takes several cores for all others to end.
+one that is best in worlds of validation (`bench.follow.choice`). Whether it is better than what ships is not asked:
+look at the page first. Two processes go side by side, each on a core of its own; a stage waits for those it needs, and
+one that takes several cores for all others to end.
 """
 
 import shutil

@@ -25,8 +25,8 @@ of this page is made by one command, from nothing; it goes on where it was when 
 make reproduce-follow
 ```
 
-What comes of it stays in `results/follow/`, and the policies that ship are kept: with `ARGS="--publish"` those of
-seed 1 take their place.
+What comes of it stays in `results/follow/`, and the policies that ship are kept: with `ARGS="--publish"` the best
+of the seeds that were trained (`--seeds 3`) take their place.
 
 A teacher that sees the truth is trained by PPO; students that see what flies (a 64 x 64 picture with depth, the flight
 controller's estimate and, but for vision-only, the phone's reports) learn from it by DAgger; PPO may go on with what
