@@ -4,7 +4,7 @@ In: `navigate`, `drive-park` or `drive-reach`, and the recipes of its legs. Out:
 leg, one on each core, and what it said in a log beside it; a table of how the last ones do in validation worlds, their
 scans 0 to 0.2 s late, and the best as results/NAME-chosen.pt. With `judge`, or policy files, it judges only; with
 `seed=N LEG` it trains that leg alone. What is chosen by is neither trained on nor of the tests; with `test` the worlds
-are those of the tests, and nothing is chosen.
+are those of the tests, and nothing is chosen. The card of the best says how it did without lag.
 """
 
 import subprocess
@@ -20,10 +20,10 @@ from rich.console import Console
 
 from bench.drive import LONGEST as DRIVE_LONGEST
 from bench.goal_episodes import Outcomes, first_episodes
+from bench.judged_card import write_judged
 from bench.navigate import LONGEST as NAVIGATE_LONGEST
 from bench.navigate import arrival_speeds
 from bench.side_by_side import Job, run_side_by_side
-from common.files import write_whole
 from common.intervals import Interval, rate
 from policies.learn.config.load import load_config
 from policies.learn.config.recipes import recipe
@@ -195,7 +195,7 @@ def main(arguments: Sequence[str]) -> int:
     best = max(found, key=lambda each: each.low)
     print(f"chosen: {best.path}, whose intervals begin at {100 * best.low:.1f} % on average")
     if not named:
-        write_whole(_chosen(name), best.path.read_bytes())
+        write_judged(best.path, _chosen(name), "success", best.success[LAGS_S.index(0.0)], TRAININGS[name].episodes)
     return 0
 
 

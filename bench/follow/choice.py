@@ -1,9 +1,9 @@
-"""`python -m bench.follow.choice POLICY…`: which of some policies of following is best, by worlds of validation.
+"""`python -m bench.follow.choice POLICY… [--out FILE]`: which of some policies of following is best, by validation.
 
 In: policy files of FollowMe that all see the same, such as several seeds of a recipe. Out: how long each stays in the
-band, with 95 % intervals, best first by where the interval begins; those with `observation=tracked` fly under the
-guard's rule of the owner. The episodes, of split `validation`, are not flown in a test, nor trained on since there is
-that split.
+band, with 95 % intervals, best first by where the interval begins, and that one as FILE, whose card says it; those with
+`observation=tracked` fly under the guard's rule of the owner. The episodes, of split `validation`, are not flown in a
+test, nor trained on since there is that split.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,6 +16,7 @@ from rich.progress import track
 from rich.table import Table
 
 from bench.follow.judge import first_episodes
+from bench.judged_card import write_judged
 from policies.learn.export.policy_file import load_policy
 from policies.tasks.catalogue import task_settings
 from policies.tasks.follow_me.follow_me import FollowMe
@@ -31,14 +32,19 @@ def main(
     policies: list[Path],
     airframe: Annotated[str, typer.Option(help="Of several with + between them one is drawn per episode.")] = WIDE,
     episodes: Annotated[int, typer.Option(min=2, help="Of each policy.")] = EPISODES,
+    out: Annotated[Path | None, typer.Option(help="The best goes there.")] = None,
     drawn_as: Annotated[Path | None, typer.Option(help="Conditions: as this policy's training drew them.")] = None,
 ) -> None:
     numbers = load_policy(drawn_as)[1].samplers() if drawn_as is not None else {}
     found = {path: judged(path, airframe, episodes, numbers) for path in track(policies, "judging", transient=True)}
     table = Table("policy", "in band", "collided")
-    for path, card in sorted(found.items(), key=lambda pair: -pair[1].in_band.low):
+    best_first = sorted(found.items(), key=lambda pair: -pair[1].in_band.low)
+    for path, card in best_first:
         table.add_row(str(path), written(card.in_band, "%"), written(card.collision, "%"))
     Console().print(table)
+    if out is not None:
+        best, card = best_first[0]
+        write_judged(best, out, "band", card.in_band, episodes)
 
 
 def judged(path: Path, airframe: str, episodes: int, numbers: Mapping[str, Sampler]) -> Scorecard:

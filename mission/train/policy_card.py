@@ -37,10 +37,11 @@ def card_rows(card: PolicyCard) -> Iterator[tuple[str, str]]:
     yield "steps", f"{card.steps:,}"
     if card.numbers:
         yield "task parameters", ", ".join(card.numbers)
-    if "success_rate" in card.figures:
-        yield "success, judged", _rate(card.figures, "", "episodes that it did not train on")
+    for measure, said in (("success", "success, judged"), ("band", "time in the band, judged")):
+        if f"{measure}_rate" in card.figures:
+            yield said, _rate(card.figures, "", measure, "episodes that it did not train on")
     if "training_success_rate" in card.figures:
-        yield "success, training", _rate(card.figures, "training_", "last episodes")
+        yield "success, training", _rate(card.figures, "training_", "success", "last episodes")
     if "training_reward" in card.figures:
         yield "reward, training", f"{card.figures['training_reward']:.3f}"
     yield "code", _code(card.code)
@@ -58,11 +59,11 @@ def _task(task: str, settings: Mapping[str, Any]) -> str:
     return f"{task} ({given})" if given else task
 
 
-def _rate(figures: Mapping[str, float], prefix: str, what: str) -> str:
-    """A success rate, with its interval and how many episodes it is of, if the card has them."""
-    text = f"{100.0 * figures[f'{prefix}success_rate']:.2f} %"
-    if f"{prefix}success_low" in figures:
-        low, high = (100.0 * figures[f"{prefix}success_{end}"] for end in ("low", "high"))
+def _rate(figures: Mapping[str, float], prefix: str, measure: str, what: str) -> str:
+    """A rate, with its interval and how many episodes it is of, if the card has them."""
+    text = f"{100.0 * figures[f'{prefix}{measure}_rate']:.2f} %"
+    if f"{prefix}{measure}_low" in figures:
+        low, high = (100.0 * figures[f"{prefix}{measure}_{end}"] for end in ("low", "high"))
         text += f" (95 %: {low:.2f} to {high:.2f})"
     count = figures.get(f"{prefix}episodes")
     return f"{text} of {count:,} {what}" if count is not None else text
