@@ -1,10 +1,10 @@
-"""A policy file whose card says how good it was found to be in worlds of validation."""
+"""A policy file whose card says how good it was found to be in worlds of validation, and is else as it was."""
 
-from dataclasses import replace
 from pathlib import Path
 
 from common.intervals import Interval
-from policies.learn.export.policy_file import load_policy, save_policy
+from policies.learn.checkpoint import load, save
+from policies.learn.export.policy_file import POLICY
 
 
 def write_judged(source: Path, target: Path, measure: str, found: Interval, episodes: int) -> None:
@@ -17,6 +17,7 @@ def write_judged(source: Path, target: Path, measure: str, found: Interval, epis
         found: the figure [1].
         episodes: that it is of.
     """
-    policy, card = load_policy(source)
+    content = load(source, POLICY)
     figures = {f"{measure}_rate": found.value, f"{measure}_low": found.low, f"{measure}_high": found.high}
-    save_policy(target, policy, replace(card, figures=card.figures | figures | {"episodes": episodes}))
+    content["card"]["figures"] |= figures | {"episodes": episodes}
+    save(target, content, POLICY)

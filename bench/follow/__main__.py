@@ -9,27 +9,32 @@ one that takes several cores for all others to end.
 """
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated
 
+import torch
 import typer
 from rich.console import Console
 
 from bench.cars.page import DOCS
-from bench.follow.choice import best_of
+from bench.follow.choice import EPISODES, MEASURES, best_of
 from bench.follow.page import write_page
 from bench.follow.result import Result, read, read_all, write, write_all
 from bench.follow.run import policy_path, result_path
-from bench.follow.stages import STAGES, in_order
+from bench.follow.stages import STAGES, Stage, in_order
+from bench.judged_card import write_judged
 from bench.side_by_side import Job, run_side_by_side
 from common.files import write_whole
+from common.intervals import Interval
+from policies.learn.export.policy_file import load_policy
 
 RESULTS = Path("results/follow")
 RUNS = DOCS / "follow.jsonl"
 PRETRAINED = Path(__file__).parents[2] / "policies" / "pretrained"
 console = Console(highlight=False)
+Choose = Callable[[Sequence[Path], str], tuple[Path, Interval]]
 
 
 def main(
@@ -85,31 +90,52 @@ def _fetch(result: Result) -> None:
         write_whole(policy_path(RESULTS, result.stage, 1), shipped.read_bytes())
 
 
-def published(results_folder: Path, pretrained: Path) -> list[str]:
-    """Puts the best seeds' policies among those that ship, under the names of their recipes; says which."""
+def published(results_folder: Path, pretrained: Path, choose: Choose = best_of) -> list[str]:
+    """Puts policies among those that ship, under the names of their recipes; says which.
+
+    Args:
+        results_folder: where they were trained.
+        pretrained: where those that ship are.
+        choose: the best of several seeds' by a figure of the scorecard.
+    """
     lines = []
-    for trained, ships in _new(results_folder, pretrained):
-        best = trained[0] if len(trained) == 1 else best_of(trained)
-        write_whole(ships, best.read_bytes())
-        lines.append(f"{ships.name}: ships now what lies in {best}")
+    for stage, trained in _trained(results_folder):
+        ships = pretrained / f"{stage.recipe}.pt"
+        before = ships.read_bytes() if ships.exists() else b""
+        if len(trained) == 1:
+            best = trained[0]
+            write_whole(ships, best.read_bytes())
+        else:
+            best, found = choose(trained, stage.figure)
+            write_judged(best, ships, MEASURES[stage.figure], found, EPISODES)
+        if ships.read_bytes() != before:
+            lines.append(f"{ships.name}: ships now what lies in {best}")
     return lines
 
 
 def unpublished(results_folder: Path, pretrained: Path) -> list[str]:
-    """A line for each of these policies that is another than the one that ships, which stays."""
-    new = _new(results_folder, pretrained)
-    return [f"{', '.join(map(str, trained))}: not {ships.name}, which still ships: --publish" for trained, ships in new]
-
-
-def _new(results_folder: Path, pretrained: Path) -> list[tuple[list[Path], Path]]:
-    """The policies of all seeds of stages of which none ships, and the files that one would take the place of."""
-    found = []
-    for stage in (stage for stage in STAGES.values() if stage.ships):
-        trained = sorted(results_folder.glob(f"{stage.name}-[0-9]*.pt"))
+    """A line for each stage of whose policies none is the one that ships, which stays."""
+    lines = []
+    for stage, trained in _trained(results_folder):
         ships = pretrained / f"{stage.recipe}.pt"
-        if trained and not (ships.exists() and ships.read_bytes() in [path.read_bytes() for path in trained]):
-            found.append((trained, ships))
-    return found
+        if not any(_is_same(path, ships) for path in trained):
+            lines.append(f"{', '.join(map(str, trained))}: not {ships.name}, which still ships: --publish")
+    return lines
+
+
+def _trained(results_folder: Path) -> list[tuple[Stage, list[Path]]]:
+    """The policies of all seeds of each stage that ships and has been trained."""
+    stages = [stage for stage in STAGES.values() if stage.ships]
+    found = [(stage, sorted(results_folder.glob(f"{stage.name}-[0-9]*.pt"))) for stage in stages]
+    return [(stage, trained) for stage, trained in found if trained]
+
+
+def _is_same(trained: Path, ships: Path) -> bool:
+    """Whether two files hold one policy, whatever their cards say."""
+    if not ships.exists():
+        return False
+    own, other = (load_policy(path)[0].state_dict() for path in (trained, ships))
+    return own.keys() == other.keys() and all(torch.equal(own[name], other[name]) for name in own)
 
 
 def _jobs(names: Sequence[str], seeds: int) -> list[Job]:

@@ -17,6 +17,7 @@ from rich.table import Table
 
 from bench.follow.judge import first_episodes
 from bench.judged_card import write_judged
+from common.intervals import Interval
 from policies.learn.export.policy_file import load_policy
 from policies.tasks.catalogue import task_settings
 from policies.tasks.follow_me.follow_me import FollowMe
@@ -25,7 +26,8 @@ from policies.tasks.follow_me.settings import FollowSettings
 from policies.tasks.task_params import Sampler
 
 WIDE = "x500+f450+f550"
-EPISODES = 256  # of each policy
+EPISODES = 1000  # of each policy: two minutes
+MEASURES = {"in_band": "band", "success": "success"}  # figures of the scorecard as cards call them
 
 
 def main(
@@ -44,7 +46,7 @@ def main(
     Console().print(table)
     if out is not None:
         best, card = best_first[0]
-        write_judged(best, out, "band", card.in_band, episodes)
+        write_judged(best, out, MEASURES["in_band"], card.in_band, episodes)
 
 
 def judged(path: Path, airframe: str, episodes: int, numbers: Mapping[str, Sampler]) -> Scorecard:
@@ -59,9 +61,11 @@ def judged(path: Path, airframe: str, episodes: int, numbers: Mapping[str, Sampl
     return scorecard(tracks)
 
 
-def best_of(paths: Sequence[Path], episodes: int = EPISODES) -> Path:
-    """The one whose interval of the time in the band begins highest."""
-    return max(paths, key=lambda path: judged(path, WIDE, episodes, {}).in_band.low)
+def best_of(paths: Sequence[Path], figure: str) -> tuple[Path, Interval]:
+    """The policy whose interval of a figure of the scorecard begins highest, and that interval."""
+    found = {path: getattr(judged(path, WIDE, EPISODES, {}), figure) for path in paths}
+    best = max(found, key=lambda path: found[path].low)
+    return best, found[best]
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ was measured.
 """
 
 from functools import lru_cache
-from math import asin, atan2, cos, degrees, isfinite, isnan, sin
+from math import asin, atan2, cos, degrees, dist, hypot, isfinite, isnan, sin
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,8 @@ _STAMP_OLD_US = 5_000_000  # the sender's clock is another than the vehicle's if
 _NORTH_FRAMES, _BODY_FRAMES = frozenset({0, 1}), frozenset({8, 12})  # MAV_FRAME
 _CUSTOM_ROTATION = 100  # MAV_SENSOR_ROTATION_CUSTOM
 _ELEVATION_OFF_DEG, _BEARING_OFF_DEG = 6.0, 20.0  # guess: the attitude is a frame older than the beam
+_POSE_OFF_US = 60_000  # of telemetry at 10 Hz the nearest pose is at most half as far off
+_JUMP_M, _CHANGE_M_S = 0.5, 3.0  # so far, and so much faster than now, a vehicle may have moved; guess
 _OVERLAP_DEG = 0.1  # by which a bin must reach into a sector to count there: rounding
 
 
@@ -89,10 +91,15 @@ class Ranges:
     def from_here(self) -> Floats:
         """The newest ranges as they would be from where the vehicle is now, by the kernel function of training.
 
-        Those of tilted beams are as they were measured, and all are where it is not known where that was.
+        Those of tilted beams are as they were measured, and all are where it is not known where that was: telemetry has
+        no pose of then, the scan is too old, or the position has jumped since, as estimates do when GNSS is back.
         """
         pose, own = self.poses.at(self.taken_us), self._own
-        if pose is None or self.taken_us == NEVER_US or not isfinite(own.pos_ned[0]):
+        age_us = own.boot_us - self.taken_us
+        if pose is None or abs(pose.time_us - self.taken_us) > _POSE_OFF_US or not 0 <= age_us <= OLD_US:
+            return self.ranges_m
+        moved_m = dist(pose.pos_ned[:2], own.pos_ned[:2])
+        if not moved_m <= _JUMP_M + age_us * 1e-6 * (hypot(*own.vel_ned[:2]) + _CHANGE_M_S):
             return self.ranges_m
         self._measured[0] = self._moved[0] = self.ranges_m
         self._was[0] = *pose.pos_ned[:2], yaw_of(pose.q_ned_from_frd)

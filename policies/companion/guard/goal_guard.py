@@ -124,8 +124,10 @@ class GoalGuard:
         kept = scale * level
         kept *= min(1.0, min(most, self.settings.speed_max) / max(float(np.hypot(*kept)), 1e-6))
         self._count(TOO_FAST if self.stance is GoalStance.FREE else self.stance.value, level, kept)
-        if is_tilted(own.q_ned_from_frd, self.settings):
-            kept = np.zeros(2) if self._drives else np.array(own.vel_ned[:2])  # asks for no more tilt
+        if self.stance is GoalStance.FREE and is_tilted(own.q_ned_from_frd, self.settings):
+            own_level = np.array(own.vel_ned[:2])
+            own_level *= min(1.0, self.settings.speed_max / max(float(np.hypot(*own_level)), 1e-6))
+            kept = np.zeros(2) if self._drives else own_level  # asks for no more tilt
             self.interventions.note(TILTED)
         return self._bounded(kept, scale * velocity[2], yaw_rate, own, age_s)
 

@@ -116,7 +116,7 @@ class Guard:
             level, down = scale * level, scale * down
             yaw_rate = self._facing_owner(own, yaw_rate)
             self.interventions.note(self.stance.value)
-        if is_tilted(own.q_ned_from_frd, s):
+        if self.stance is Stance.FREE and is_tilted(own.q_ned_from_frd, s):
             level = np.array(own.vel_ned[:2])  # asks for no more tilt
             self.interventions.note(TILTED)
         let_be, people = self._past_people(level, own)

@@ -10,7 +10,10 @@ from bench.follow.__main__ import published, unpublished
 from bench.follow.page import duration, write_page
 from bench.follow.result import Judged, Result, read, read_all, write, write_all
 from bench.follow.stages import CELLS, OWNER_SPEEDS, STAGES, in_order
+from common.intervals import Interval
 from policies.learn.config.recipes import recipe
+from policies.learn.export.policy_file import load_policy
+from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.follow_me.scorecard import scorecard
 from policies.tasks.follow_me.track import Track
 
@@ -69,38 +72,47 @@ def test_page_without_any_result_is_still_a_page(tmp_path):
     assert "none yet" in write_page({}, tmp_path).read_text(encoding="utf-8")
 
 
+def shipped(name):
+    return pretrained(name).read_bytes()
+
+
 def test_policies_that_ship_stay_unless_new_ones_are_published(tmp_path):
     results, ships = tmp_path / "results", tmp_path / "pretrained"
     results.mkdir()
     ships.mkdir()
-    (ships / "follow-me.pt").write_bytes(b"old")
-    (ships / "follow-me-vision.pt").write_bytes(b"same")
-    for name, content in (
-        ("student-1", b"new"),
-        ("vision-only-1", b"no"),
-        ("tuned-1", b"no"),
-        ("vision-only-2", b"same"),
-    ):
+    old, new, same = (shipped(name) for name in ("follow-me-teacher", "follow-me", "follow-me-vision"))
+    (ships / "follow-me.pt").write_bytes(old)
+    (ships / "follow-me-vision.pt").write_bytes(same)
+    made = {"student-1": new, "vision-only-1": same, "tuned-1": old}
+    for name, content in made.items():
         (results / f"{name}.pt").write_bytes(content)
     (line,) = unpublished(results, ships)
     assert line == f"{results / 'student-1.pt'}: not follow-me.pt, which still ships: --publish"
-    assert (ships / "follow-me.pt").read_bytes() == b"old"
+    assert (ships / "follow-me.pt").read_bytes() == old
     assert len(published(results, ships)) == 1
-    assert (ships / "follow-me.pt").read_bytes() == b"new"
+    assert (ships / "follow-me.pt").read_bytes() == new
     assert {path.name for path in ships.iterdir()} == {"follow-me.pt", "follow-me-vision.pt"}
     assert not unpublished(results, ships)
 
 
-def test_of_several_seeds_the_best_is_published(tmp_path, monkeypatch):
-    (tmp_path / "pretrained").mkdir()
-    for seed in (1, 2, 3):
-        (tmp_path / f"student-{seed}.pt").write_bytes(str(seed).encode())
-    (tmp_path / "tracked-student-1.pt").write_bytes(b"of another stage, which does not ship")
+def test_of_several_seeds_the_chosen_is_published_whichever_shipped_and_says_what_it_was_chosen_by(tmp_path):
+    ships = tmp_path / "pretrained"
+    ships.mkdir()
+    (tmp_path / "vision-only-1.pt").write_bytes(shipped("follow-me-vision"))
+    (tmp_path / "vision-only-2.pt").write_bytes(shipped("follow-me-tracked"))
+    (tmp_path / "tracked-student-1.pt").write_bytes(shipped("follow-me-teacher"))  # of a stage that does not ship
+    (ships / "follow-me-vision.pt").write_bytes(shipped("follow-me-vision"))
     asked = []
-    monkeypatch.setattr("bench.follow.__main__.best_of", lambda paths: asked.extend(paths) or paths[1])
-    published(tmp_path, tmp_path / "pretrained")
-    assert [path.name for path in asked] == ["student-1.pt", "student-2.pt", "student-3.pt"]
-    assert (tmp_path / "pretrained" / "follow-me.pt").read_bytes() == b"2"
+
+    def second(paths, figure):
+        asked.append(([path.name for path in paths], figure))
+        return paths[1], Interval(0.8, 0.7, 0.9)
+
+    assert len(published(tmp_path, ships, second)) == 1
+    assert asked == [(["vision-only-1.pt", "vision-only-2.pt"], "success")]
+    _, card = load_policy(ships / "follow-me-vision.pt")
+    assert (card.figures["success_low"], card.figures["success_high"]) == (0.7, 0.9)
+    assert not unpublished(tmp_path, ships)  # the card differs, the policy does not
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(90.0, "90 s"), (900.0, "15.0 min"), (7200.0, "2.0 h")])

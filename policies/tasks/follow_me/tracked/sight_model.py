@@ -127,14 +127,18 @@ def sight_drawn(
         along = level_m * (bias + noise * _COLOUR_FRACTION * wp.randn(state))
     aside = level_m * (_ACROSS_BIAS_RAD * wp.randn(fixed) + noise * _ACROSS_RAD * wp.randn(state))
     down = _DOWN_BIAS_M * wp.randn(fixed) + _DOWN_M * wp.randn(state)
-    aside += p[1] * (1.0 / n.lens_scale - 1.0)  # where a lens shows them that is taken for the usual one
+    across = p[0] / level_m  # of what is aside in the image
+    aside += p[1] * across * (1.0 / n.lens_scale - 1.0)  # where a lens shows them that is taken for the usual one
     down += level_m * wp.tan(n.lens_tilt_deg * _RADIANS)
-    if n.lens_distortion != 0.0:
-        below = p[2] - level_m * _TILT
-        off = wp.vec2(p[1], below) / (level_m * HALF_WIDTH)  # from the image's middle, in halves of its width
-        farther = (1.0 + n.lens_distortion) / (1.0 + n.lens_distortion * wp.dot(off, off)) - 1.0
-        aside += p[1] * farther
-        down += below * farther
+    if n.lens_distortion != 0.0 and sight.is_in_view == 1:
+        ahead = wp.max(p[0], 0.1)
+        below = p[2] - ahead * _TILT
+        off = wp.vec2(p[1], below) / (ahead * HALF_WIDTH)  # from the image's middle, in halves of its width
+        shown = float(1.0)  # times as far from the middle as it is without: `undistorted`, the other way round
+        for _ in range(3):
+            shown = (1.0 + n.lens_distortion) / (1.0 + n.lens_distortion * shown * shown * wp.dot(off, off))
+        aside += p[1] * across * (shown - 1.0)
+        down += below * (shown - 1.0)
     out = p * (1.0 + wp.max(along / level_m, -0.5)) + wp.vec3(-p[1] / level_m * aside, p[0] / level_m * aside, down)
     if wp.randf(state) < _STRAY:
         out += wp.vec3(_STRAY_M * wp.randn(state), _STRAY_M * wp.randn(state), 0.0)

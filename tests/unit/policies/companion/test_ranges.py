@@ -161,6 +161,44 @@ def test_a_scan_that_comes_late_is_shown_from_where_the_vehicle_is_now_and_beams
     assert vehicle.ranges.ranges_m[24] == pytest.approx(5.0)  # what was measured stays: the guard has poses of its own
 
 
+def moving(*places, yaw_rad=0.0):
+    """A vehicle that was at these places, a tenth of a second apart from one second on, in flight eastwards."""
+    vehicle = Vehicle()
+    q1, q2, q3, q4 = wxyz_from_quat(quat_of(yaw_rad, 0.0))
+    for k, (north_m, east_m) in enumerate(places):
+        time_ms = 1_000 + 100 * k
+        vehicle.tell("LOCAL_POSITION_NED", time_boot_ms=time_ms, x=north_m, y=east_m, vy=4.0)
+        vehicle.tell("ATTITUDE_QUATERNION", time_boot_ms=time_ms, q1=q1, q2=q2, q3=q3, q4=q4)
+        vehicle.ranges.follow()
+    return vehicle
+
+
+def test_what_was_abeam_is_behind_after_a_flight_ahead_and_nearer_after_one_towards_it():
+    ahead = moving((0.0, 0.0), (0.0, 0.4), (0.0, 0.8), yaw_rad=np.radians(90.0))  # its nose east
+    ahead.sectors(bins(b42=200), -117.5, time_us=999_999)  # 92.5 degrees right: south
+    shown = ahead.ranges.from_here()
+    bearing_deg = 92.5 + np.degrees(np.arctan2(0.8 * np.sin(np.radians(92.5)), 2.0 - 0.8 * np.cos(np.radians(92.5))))
+    (at,) = np.flatnonzero(shown[:SECTORS] < RANGE_M)
+    assert abs(5.0 * at - 117.5 - bearing_deg) < 2.6
+    assert shown[at] == pytest.approx(np.hypot(2.0, 0.8), abs=0.1)
+    towards = moving((0.0, 0.0), (-0.4, 0.0), (-0.8, 0.0), yaw_rad=np.radians(90.0))  # it drifts south
+    towards.sectors(bins(b42=200), -117.5, time_us=999_999)
+    assert towards.ranges.from_here()[:SECTORS].min() == pytest.approx(1.2, abs=0.05)
+
+
+@pytest.mark.parametrize("places", [[(0.0, 0.0), (0.0, 50.0)], [(0.0, 0.0)] * 7])
+def test_a_scan_is_shown_as_it_was_measured_after_a_jump_of_the_estimate_and_when_it_is_old(places):
+    vehicle = moving(*places)
+    vehicle.sectors(bins(b24=500), -117.5, time_us=999_999)
+    assert vehicle.ranges.from_here()[24] == pytest.approx(5.0)
+
+
+def test_a_stamp_of_before_all_poses_moves_nothing():
+    vehicle = moving((0.0, 0.0), (0.0, 0.4))
+    vehicle.sectors(bins(b24=500), -117.5, time_us=700_000)
+    assert vehicle.ranges.from_here()[24] == pytest.approx(5.0)
+
+
 def test_a_scan_is_shown_as_it_was_measured_where_nobody_knows_where_that_was():
     vehicle = Vehicle()
     vehicle.sectors(bins(b24=500), -117.5)

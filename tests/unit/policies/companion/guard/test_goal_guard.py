@@ -256,3 +256,13 @@ def test_who_leans_too_far_is_asked_to_go_on_as_it_does_or_to_stand_if_it_drives
     (level, _, _), _ = approach.guard.filtered(FULL_SPEED, approach.own)
     assert level == pytest.approx(kept, abs=0.1)
     assert approach.guard.interventions[TILTED] == 1
+
+
+def test_who_leans_too_far_with_old_ranges_still_stands() -> None:
+    approach = Approach(GoalGuard(S, drives=False), SCANNER, 100.0, 0.0)
+    approach.fly(3.0, ((4.0, 0.0, 0.0), 0.0))
+    approach.own.boot_us += round(S.scan_stop_s * 1e6) + 100_000
+    approach.own.q_ned_from_frd = quat_of(0.0, radians(-60.0))
+    (level, _, _), _ = approach.guard.filtered(FULL_SPEED, approach.own)
+    assert level == pytest.approx(0.0, abs=1e-6)
+    assert approach.guard.stance is GoalStance.STOP

@@ -101,6 +101,16 @@ def test_who_leans_too_far_is_asked_to_go_on_as_it_does(scene: tuple[Guard, Own,
     assert TILTED not in guard.interventions.latest
 
 
+def test_who_leans_too_far_without_pictures_still_stands(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, _ = scene
+    flown(guard, own, 1.0)
+    own.vel_ned, own.q_ned_from_frd = (3.0, 0.0, 0.0), quat_of(0.0, np.radians(-60.0))
+    own.boot_us += 1_000_000
+    guard.senses.sense(own, Owner(), None)
+    assert guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[0][:2] == (0.0, 0.0)
+    assert guard.stance is Stance.BLIND
+
+
 @pytest.mark.parametrize(("height_m", "down"), [(3.4, -2.0), (1.1, 2.0), (0.8, 0.0)])
 def test_a_height_that_it_does_not_let_be_flown_is_a_reason(
     scene: tuple[Guard, Own, Sees], height_m: float, down: float

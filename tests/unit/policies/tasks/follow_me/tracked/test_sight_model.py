@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from policies.tasks.catalogue import build_task, task_settings
+from policies.tasks.follow_me.owner_visibility import HALF_WIDTH
 
 ENVS = 16
 
@@ -49,12 +50,20 @@ def test_a_wider_lens_shows_people_nearer_to_the_middle():
     assert np.all(np.abs(wider[aside, 1]) < np.abs(usual[aside, 1]))
 
 
-def test_a_barrel_shows_people_between_middle_and_edge_farther_out_and_a_cushion_nearer():
-    usual, barrel, cushion = sights(), sights(lens_distortion=0.15), sights(lens_distortion=-0.15)
-    aside = np.abs(usual[:, 1])
-    level_m = np.hypot(usual[:, 0], usual[:, 1])
-    below = usual[:, 2] - level_m * np.tan(np.radians(10.0))  # the camera looks down
-    between = (aside > 0.3) & (np.hypot(aside, below) < 0.7 * level_m)  # it shows a metre to each side per metre ahead
-    assert between.sum() > 4
-    assert np.all(np.abs(barrel[between, 1]) > aside[between])
-    assert np.all(np.abs(cushion[between, 1]) < aside[between])
+@pytest.mark.parametrize("distortion", [-0.15, 0.15])
+def test_a_lens_that_bends_lines_shifts_bearings_as_much_as_in_the_image(distortion):
+    usual, bent = sights(), sights(lens_distortion=distortion)
+    ahead, right, down = usual.T
+    off = np.stack([right, down - ahead * np.tan(np.radians(10.0))]) / ahead / HALF_WIDTH  # the camera looks down
+    radius = np.hypot(*off)
+    shown = radius.copy()
+    for _ in range(20):  # where the image shows it: shown * (1 + k shown²) / (1 + k) = radius
+        shown = radius * (1.0 + distortion) / (1.0 + distortion * shown**2)
+    is_inside = (ahead > 0.5) & (np.abs(off).max(axis=0) < 0.9)
+    assert is_inside.sum() > 10
+    expected = np.degrees(np.arctan(off[0] * HALF_WIDTH * shown / radius) - np.arctan(off[0] * HALF_WIDTH))
+    shift = np.degrees(np.arctan2(bent[:, 1], bent[:, 0]) - np.arctan2(right, ahead))
+    off_deg = np.abs(shift - expected)[is_inside]  # about sights that are up to a quarter of a metre wrong
+    assert np.median(off_deg) < 0.2
+    assert off_deg.max() < 1.0
+    assert np.abs(expected[is_inside]).max() > 1.5
