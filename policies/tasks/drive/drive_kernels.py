@@ -114,11 +114,11 @@ def show_frame(
     place = wp.vec2(truth.pos_ned[0], truth.pos_ned[1])
     heading = yaw_from_quat(truth.q_ned_from_frd)
     ring_ranges(world_now(rig, i), place, heading, state.params[i].range_noise, rig.seed[i], tick, state.ranges_m, i)
-    told = reported_estimate(rig, i, rules.has_estimator, state.attitude_errors)
+    reported = reported_estimate(rig, i, rules.has_estimator, state.attitude_errors)
     scans_m, lag_s = state.scans_m, state.params[i].scan_lag_s
-    show_late(lag_s, is_first, level_pose(told), rules.sectors, scans_m, state.scan_poses, state.ranges_m, i)
+    show_late(lag_s, is_first, level_pose(reported), rules.sectors, scans_m, state.scan_poses, state.ranges_m, i)
     at = open_frame(buffers, i)
-    write_frame(own_drive(told), state.actions[i], state.goals[i], state.ranges_m, buffers.observations, i, at)
+    write_frame(own_drive(reported), state.actions[i], state.goals[i], state.ranges_m, buffers.observations, i, at)
 
 
 @wp.kernel(enable_backward=False)
