@@ -76,6 +76,9 @@ class Recorder:
         rewards, outcomes = buffers.rewards.numpy().copy(), buffers.outcomes.numpy()
         for i, row in enumerate(self._rows):
             row.rewards.append(rewards[i])
+        if self._task.is_skipped is not None:
+            for i_row in np.flatnonzero(self._task.is_skipped):
+                self.drop(int(i_row))  # it stands between two episodes
         return [(int(i), self._taken(int(i), Outcome(int(outcomes[i])))) for i in np.flatnonzero(outcomes)]
 
     def drop(self, i_row: int) -> None:

@@ -108,8 +108,10 @@ def _play(
         while not tally.is_complete:
             actions, memory = policy.act(tensors.observation, memory, generator)
             tensors.step(policy.bounded(actions), actions.branches)
-            is_over, is_cut = tally.count(tensors.rewards.cpu().numpy(), tensors.outcomes.cpu().numpy())
-            memory = memory.masked_fill(torch.from_numpy(is_over).to(memory.device)[:, None], 0.0)
+            rewards, outcomes = tensors.rewards.cpu().numpy(), tensors.outcomes.cpu().numpy()
+            is_over, is_cut = tally.count(rewards, outcomes, task.is_skipped)
+            is_forgotten = is_over if task.is_skipped is None else is_over | task.is_skipped
+            memory = memory.masked_fill(torch.from_numpy(is_forgotten).to(memory.device)[:, None], 0.0)
             if is_cut.any():
                 task.begin(is_cut)
             if progress is not None and is_over.any():
@@ -139,11 +141,14 @@ class _Tally:
         return int(self._outcomes.sum())
 
     def count(
-        self, rewards: NDArray[np.float32], outcomes: NDArray[np.int32]
+        self,
+        rewards: NDArray[np.float32],
+        outcomes: NDArray[np.int32],
+        is_skipped: NDArray[np.bool_] | None = None,
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Books one decision; says where an episode is over, and where because it took too long."""
+        """Books one decision, where it was one; says where an episode is over, and where because it took too long."""
         self._returns += rewards
-        self._steps += 1
+        self._steps += 1 if is_skipped is None else ~is_skipped
         is_ended = outcomes != Outcome.RUNNING
         is_cut = ~is_ended & (self._steps >= self._longest)
         is_over = is_ended | is_cut

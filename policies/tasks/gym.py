@@ -20,7 +20,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from policies.tasks.catalogue import build_task, task_settings
+from policies.tasks.catalogue import UnknownTask, build_task, task_settings
 from policies.tasks.episode import Outcome
 from policies.tasks.gym_arrays import Array, Observation, TaskArrays, action_space, observation_space
 from policies.tasks.reshaping import cut_rows
@@ -271,6 +271,8 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
 
 def _built(task: str | type[Task], env_count: int, numbers: Numbers | None, settings: Mapping[str, Any]) -> Task:
     built = build_task(task, env_count, task_settings(task, settings))
+    if built.is_skipped is not None:
+        raise UnknownTask(f"{built.layout.task}: begins episodes by itself: take it from gymnasium.make_vec")
     built.set_params(
         {
             name: Sampler(intervals=((value[0], value[1]),)) if isinstance(value, (tuple, list)) else value

@@ -2,7 +2,8 @@
 
 In: actions in the task's buffers. Out: what a vector environment of Gymnasium makes of them, written where the kernels
 of other tasks write theirs. Episodes are begun here (`AutoresetMode.DISABLED` with `reset_mask`), so that what they saw
-last is kept. An environment's own state cannot be saved: a run that is resumed begins its episodes anew.
+last is kept; or by a vector environment itself (`NEXT_STEP`), whose steps in between are skipped. An environment's own
+state cannot be saved: a run that is resumed begins its episodes anew.
 """
 
 import ast
@@ -18,6 +19,7 @@ from pydantic import ConfigDict, model_validator
 
 from policies.tasks.catalogue import GYM, UnknownTask, import_users_module
 from policies.tasks.episode import Outcome
+from policies.tasks.gym_next_step import NextStepRows
 from policies.tasks.gym_spaces import ActionWriter, ObservationReader, UnfitSpace
 from policies.tasks.layout import Layout
 from policies.tasks.reshaping import Rows
@@ -36,8 +38,9 @@ class GymSettings(TaskSettings):
 
     preset: Literal[""] = ""  # type: ignore[assignment]  # there are none
     """There are none."""
-    vectorization: Literal["sync", "async"] = "sync"
-    """Whether environments are stepped one after the other, or each in a process of its own."""
+    vectorization: Literal["sync", "async", "vector_entry_point"] = "sync"
+    """Whether environments are stepped one after the other, each in a process of its own, or all by the vector
+    environment that is registered for them (of an ID that has nothing else, always so)."""
 
     @model_validator(mode="before")
     @classmethod
@@ -88,6 +91,13 @@ class GymTask(Task):
         )
         super().__init__(layout, env_count, number_defaults={}, device=device)
         self._seeds: list[int | None] = [None] * env_count
+        is_next_step = self.envs.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+        self._between = NextStepRows(env_count) if is_next_step else None
+
+    @property
+    def is_skipped(self) -> NDArray[np.bool_] | None:
+        """Where the last step was no decision: of environments that begin episodes by themselves."""
+        return None if self._between is None else self._between.is_skipped
 
     def reset(self, seed: int | Sequence[int], is_chosen: NDArray[np.bool_] | None = None) -> None:
         """Starts environments anew; of a single seed each has the next one."""
@@ -105,21 +115,29 @@ class GymTask(Task):
         """Steps them all; those that end begin their next episode."""
         rows = Rows(self)
         actions = self._writer.actions(rows.of("continuous"), rows.of("branches"))
-        observations, rewards, is_terminated, is_truncated, info = self.envs.step(actions)
-        rows.of("rewards")[:] = rewards
+        observations, rewards, *ends, info = self.envs.step(actions)
+        is_terminated, is_truncated = (np.asarray(end, dtype=np.bool_) for end in ends)
+        is_decided = np.ones(self.env_count, dtype=np.bool_)
+        if self._between is not None:
+            is_begun = self._between.step(is_terminated | is_truncated)
+            is_decided = ~self._between.is_skipped
+            self._clear(rows, is_begun)
+        rows.of("rewards")[:] = np.where(is_decided, rewards, 0.0)
         rows.of("returns")[:] += rows.of("rewards")
-        rows.of("steps")[:] += 1
-        every = np.ones(self.env_count, dtype=np.bool_)
-        self._show(rows, every, observations)
+        rows.of("steps")[:] += is_decided
+        self._show(rows, np.ones_like(is_decided), observations)
         outcomes = self._outcomes(is_terminated, is_truncated, info)
         for name in ("outcomes", "is_terminated", "is_truncated"):
             rows.of(name)[:] = 0
-        is_over = outcomes != Outcome.RUNNING
+        is_over = (outcomes != Outcome.RUNNING) & is_decided
         if is_over.any():
             rows.end(is_over, outcomes)
-            rows.of("is_terminated")[:] = is_terminated
-            rows.of("is_truncated")[:] = is_truncated & ~is_terminated
-            self._begin_rows(rows, is_over)
+            rows.of("is_terminated")[:] = is_terminated & is_over
+            rows.of("is_truncated")[:] = is_truncated & ~is_terminated & is_over
+            if self._between is None:
+                self._begin_rows(rows, is_over)
+            else:
+                self._close(rows, is_over)
         rows.write()
 
     def _outcomes(self, is_terminated: Any, is_truncated: Any, info: Mapping[str, Any]) -> NDArray[np.int32]:
@@ -135,14 +153,43 @@ class GymTask(Task):
     def _begin_rows(self, rows: Rows, is_chosen: NDArray[np.bool_]) -> None:
         if not is_chosen.any():
             return
-        seeds = [seed if chosen else None for seed, chosen in zip(self._seeds, is_chosen, strict=True)]
-        self._seeds = [None if chosen else seed for seed, chosen in zip(self._seeds, is_chosen, strict=True)]
-        # VectorEnv's annotation knows no lists of seeds; its environments do
-        observations, _ = self.envs.reset(seed=seeds, options={"reset_mask": is_chosen})  # type: ignore[arg-type]
-        for name in ("steps", "returns", "observations"):
-            rows.of(name)[is_chosen] = 0
-        rows.of("episodes")[is_chosen] += 1
+        if self._between is None:
+            seeds = [seed if chosen else None for seed, chosen in zip(self._seeds, is_chosen, strict=True)]
+            self._seeds = [None if chosen else seed for seed, chosen in zip(self._seeds, is_chosen, strict=True)]
+            observations = self._reset_some(seeds, is_chosen)
+        elif not is_chosen.all() and self._between.leave(is_chosen):  # it has no way to reset some
+            self._close(rows, is_chosen)
+            return
+        else:
+            is_chosen = np.ones_like(is_chosen)
+            self._between.restart()
+            observations, _ = self.envs.reset(seed=self._seeds[0])
+            self._seeds = [None] * self.env_count
+        self._clear(rows, is_chosen)
         self._show(rows, is_chosen, observations)
+
+    def _reset_some(self, seeds: list[int | None], is_chosen: NDArray[np.bool_]) -> Any:
+        """Observations of all rows after a reset of some."""
+        given = [seed for seed in seeds if seed is not None]
+        try:  # VectorEnv's annotation knows no lists of seeds; most of its environments do
+            return self.envs.reset(seed=seeds if given else None, options={"reset_mask": is_chosen})[0]  # type: ignore[arg-type]
+        except (TypeError, gymnasium.error.Error):
+            if not given:
+                raise
+        return self.envs.reset(seed=given[0], options={"reset_mask": is_chosen})[0]
+
+    @staticmethod
+    def _close(rows: Rows, is_over: NDArray[np.bool_]) -> None:
+        """Forgets what has been done in episodes that are over; what is seen last stays until the next one begins."""
+        for name in ("steps", "returns"):
+            rows.of(name)[is_over] = 0
+
+    @staticmethod
+    def _clear(rows: Rows, is_begun: NDArray[np.bool_]) -> None:
+        """Makes rows ready for an episode's first frame."""
+        for name in ("steps", "returns", "observations"):
+            rows.of(name)[is_begun] = 0
+        rows.of("episodes")[is_begun] += 1
 
     def _show(self, rows: Rows, is_chosen: NDArray[np.bool_], observations: Any) -> None:
         """Writes the newest frames of the chosen rows; the older ones move on."""
@@ -202,22 +249,25 @@ def _spec(env_id: str) -> EnvSpec:
 def _made(spec: EnvSpec, env_count: int, settings: GymSettings) -> VectorEnv[Any, Any, Any]:
     name = f"{GYM}{spec.id}"
     arguments = dict(settings.model_extra or {})
-    if spec.entry_point is None:
-        envs: VectorEnv[Any, Any, Any] = _called(name, lambda: gymnasium.make_vec(spec, env_count, **arguments))
-        if envs.metadata.get("autoreset_mode") is not AutoresetMode.DISABLED:
+    is_vector = spec.entry_point is None or settings.vectorization == "vector_entry_point"
+    entry_point = spec.vector_entry_point if is_vector else spec.entry_point
+    if "render_mode" not in arguments and "rgb_array" in _render_modes(name, entry_point):
+        arguments["render_mode"] = "rgb_array"
+    if is_vector:
+        made = _called(name, lambda: gymnasium.make_vec(spec, env_count, "vector_entry_point", **arguments))
+        envs: VectorEnv[Any, Any, Any] = made
+        if envs.metadata.get("autoreset_mode") not in (AutoresetMode.DISABLED, AutoresetMode.NEXT_STEP):
             raise UnknownTask(
-                f"{name}: is a vector environment that begins episodes by itself; autoreset_mode Disabled is needed"
+                f"{name}: is a vector environment that begins episodes by itself in the step that ends one, or says "
+                "nothing of it; autoreset_mode NextStep or Disabled is needed"
             )
         return envs
-    if "render_mode" not in arguments and "rgb_array" in _render_modes(name, spec):
-        arguments["render_mode"] = "rgb_array"
     makers = [lambda: gymnasium.make(spec, **arguments)] * env_count
     kind = SyncVectorEnv if settings.vectorization == "sync" else AsyncVectorEnv
     return _called(name, lambda: kind(makers, autoreset_mode=AutoresetMode.DISABLED))
 
 
-def _render_modes(name: str, spec: EnvSpec) -> Sequence[str]:
-    at = spec.entry_point
+def _render_modes(name: str, at: Any) -> Sequence[str]:
     creator = _called(name, lambda: load_env_creator(at)) if isinstance(at, str) else at
     return getattr(creator, "metadata", {}).get("render_modes", ())
 

@@ -43,6 +43,9 @@ class Reshaped(Protocol):
     @property
     def device(self) -> str: ...
 
+    @property
+    def is_skipped(self) -> NDArray[np.bool_] | None: ...
+
     def begin(self, is_chosen: NDArray[np.bool_]) -> None: ...
 
     def observe(self, frames: Array) -> Array: ...
@@ -81,6 +84,9 @@ class Reshaping:
         judged = _column(task.outcome(decision), decision.outcomes, "outcome")
         outcomes = np.where(was_over & (judged == Outcome.RUNNING), decision.outcomes, judged)  # ended is ended
         rewards = _column(task.reward(replace(decision, outcomes=outcomes)), decision.rewards, "reward")
+        if task.is_skipped is not None:  # what was no decision neither ends nor pays
+            outcomes = np.where(task.is_skipped, Outcome.RUNNING, outcomes)
+            rewards = np.where(task.is_skipped, np.float32(0.0), rewards)
         is_ended = ~was_over & (outcomes != Outcome.RUNNING)
         rows.pay(rewards)
         rows.rename(np.where(was_over, outcomes, Outcome.RUNNING))

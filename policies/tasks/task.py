@@ -187,6 +187,14 @@ class Task:
             if self.device != "cpu":
                 self._arrays[name].assign(all_rows)
 
+    @property
+    def is_skipped(self) -> NDArray[np.bool_] | None:
+        """In which rows the last step was no decision, shape (envs,), and is not learnt from; None: never in any.
+
+        So it is where an outside environment begins an episode with a step, whose action it does not use.
+        """
+        return None
+
     def _launch_begin(self, is_chosen: NDArray[np.bool_]) -> None:
         """What `begin` does of the task's own."""
         self._is_chosen.assign(is_chosen)

@@ -88,7 +88,9 @@ class Ppo:
         before = self.steps
         self._is_warming_up = before < self.hyperparameters.critic_warm_up
         self._collect(rollout)
-        self.steps += rollout.rewards.numel()
+        while not (count := rollout.decision_count):  # every environment has just begun by itself
+            self._collect(rollout)
+        self.steps += count
         has_learned_signals = any(not isinstance(signal, ExtrinsicSignal) for signal in self.signals)
         transitions = rollout.transitions() if has_learned_signals else None
         rewards = self._rewards(rollout, transitions)
@@ -97,7 +99,7 @@ class Ppo:
             statistics |= self.cloning.update(self.steps)
         most = self.behavior.max_steps
         self.policy.heads.sharpen(sharpened(self.hyperparameters.sharpening, before / most, self.steps / most))
-        return Iteration(rollout.rewards.numel(), self.task.task.take_scores(), statistics)
+        return Iteration(count, self.task.task.take_scores(), statistics)
 
     def restart(self) -> None:
         """Begins an episode in every environment; what was remembered of the running ones is forgotten."""
@@ -118,16 +120,24 @@ class Ppo:
             actions = distribution.draw(self._generator)
             self.task.step(self.policy.bounded(actions), actions.branches)
             rollout.record(t, actions, distribution.log_probs(actions), self.task)
-            self._memory = _forgotten(memory, self.task)
+            is_cut, is_skipped = self.task.is_terminated | self.task.is_truncated, self.task.is_skipped
+            if is_skipped is not None:
+                rollout.skip(t, is_skipped)
+                is_cut = is_cut | is_skipped
+            self._memory = memory.masked_fill(is_cut[:, None], 0.0) if memory.shape[1] else memory
+        if not rollout.decision_count:
+            return
+        seen = rollout.observation[:-1].mapped(rollout.decided)
         if not self._is_warming_up:
-            self.policy.body.normalize(rollout.observation[:-1])  # the critic's too, unless it sees something else
+            self.policy.body.normalize(seen)  # the critic's too, unless it sees something else
         if self.critic.body.is_privileged:
-            self.critic.body.normalize(rollout.observation[:-1])
+            self.critic.body.normalize(seen)
 
     def _rewards(self, rollout: Rollout, transitions: Transitions | None) -> Tensor:
         """Of every signal times its strength, shape (T, N, signals)."""
         streams = [rollout.rewards if transitions is None else signal.rewards(transitions) for signal in self.signals]
-        return torch.stack([s.strength * stream for s, stream in zip(self.signals, streams, strict=True)], dim=-1)
+        rewards = torch.stack([s.strength * stream for s, stream in zip(self.signals, streams, strict=True)], dim=-1)
+        return rewards if rollout.is_skipped is None else rewards.masked_fill(rollout.is_skipped[..., None], 0.0)
 
     @torch.inference_mode()
     def _estimate(self, rollout: Rollout, rewards: Tensor) -> dict[str, float]:
@@ -135,19 +145,20 @@ class Ppo:
         values, next_values = self._recurrent_values(rollout) if self.policy.memory_size else self._values(rollout)
         is_over = rollout.is_over
         is_final = rollout.is_terminated[..., None] & self._is_episodic
-        is_cut = cut_at_horizon(is_over, self.behavior.time_horizon)
+        is_cut = cut_at_horizon(rollout.is_cut, self.behavior.time_horizon)
         streams = advantages(rewards, values, next_values, is_final, is_cut, self._gammas, self.hyperparameters.lambd)
         returns = streams + values
         if self.critic.normalizer is not None:
-            self.critic.normalizer.update(returns)
+            self.critic.normalizer.update(rollout.decided(returns))
         rollout.values.copy_(self.critic.own_unit(values))
         rollout.returns.copy_(self.critic.own_unit(returns))
         combined = streams.mean(-1)
         over_buffer = self.hyperparameters.normalize_advantages == "buffer"
-        rollout.advantages.copy_(ppo_losses.standardized(combined) if over_buffer else combined)
+        decided = rollout.decided(combined)
+        rollout.advantages.copy_(ppo_losses.standardized(combined, decided) if over_buffer else combined)
         estimates = {
             f"Policy/{signal.name.capitalize()} Value Estimate": value
-            for signal, value in zip(self.signals, values.mean((0, 1)).tolist(), strict=True)
+            for signal, value in zip(self.signals, rollout.decided(values).mean((0, 1)).tolist(), strict=True)
         }
         return estimates | self._episode_rewards.add(rewards, is_over)
 
@@ -168,13 +179,13 @@ class Ppo:
     def _recurrent_values(self, rollout: Rollout) -> tuple[Tensor, Tensor]:
         """As `_values`, with the critic's memory going along, forgetting where episodes end."""
         values, next_values = [], []
-        for t, is_over in enumerate(rollout.is_over):
+        for t, is_cut in enumerate(rollout.is_cut):
             if t % rollout.sequence_length == 0:
                 rollout.critic_memories[t // rollout.sequence_length] = self._critic_memory
             value, memory = self.critic.step(rollout.observation[t], self._critic_memory)
             values.append(value)
             next_values.append(self.critic.step(rollout.next_observation(t), memory)[0])
-            self._critic_memory = memory.masked_fill(is_over[:, None], 0.0)
+            self._critic_memory = memory.masked_fill(is_cut[:, None], 0.0)
         return torch.stack(values), torch.stack(next_values)
 
     def _improve(self, rollout: Rollout, transitions: Transitions | None) -> dict[str, float]:
@@ -243,18 +254,20 @@ class Ppo:
     def _beliefs_loss(self, features: Tensor, batch: Batch) -> Tensor | float:
         """Of a policy that says what it believes: else its beliefs would go astray as its features change."""
         perception, privileged = self.policy.perception, batch.observation.privileged
+        if privileged is not None and batch.counted is not None:
+            privileged = privileged[batch.counted]
         return perception.loss(features, privileged) if perception is not None and privileged is not None else 0.0
 
     def _features(self, body: Body, batch: Batch) -> Tensor:
-        """Of a minibatch, flat, shape (B, features)."""
-        sequences = batch.sequences
+        """Of the decisions of a minibatch, flat, shape (B, features)."""
+        sequences, counted = batch.sequences, batch.counted
         if sequences is None:
             features: Tensor = body(batch.observation)
-            return features
+            return features if counted is None else features[counted]
         memory = sequences.memory if body is self.policy.body else sequences.critic_memory
         observation = batch.observation.mapped(lambda part: part.view(*sequences.is_start.shape, *part.shape[1:]))
         outputs: Tensor = body(observation, memory, sequences.is_start)
-        return outputs.flatten(0, 1)
+        return outputs.flatten(0, 1) if counted is None else outputs.flatten(0, 1)[counted]
 
     def _teach_signals(self, transitions: Transitions, batch: Batch) -> dict[str, float]:
         """One update of every signal that learns, on the decisions of a minibatch."""
@@ -327,10 +340,3 @@ class Ppo:
         if self.cloning is not None:
             self.cloning.load_state(state["cloning"])
         self.task.task.load_state(state["task"])
-
-
-def _forgotten(memory: Tensor, task: TaskTensors) -> Tensor:
-    """Memory after a decision: nothing where the episode ended with it."""
-    if not memory.shape[1]:
-        return memory
-    return memory.masked_fill((task.is_terminated | task.is_truncated)[:, None], 0.0)

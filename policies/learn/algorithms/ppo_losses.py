@@ -34,6 +34,7 @@ def divergence(log_probs: Tensor, old_log_probs: Tensor) -> Tensor:
     return (log_ratio.exp() - 1.0 - log_ratio).mean()
 
 
-def standardized(advantages: Tensor) -> Tensor:
-    """Brought to mean 0 and deviation 1."""
-    return (advantages - advantages.mean()) / (advantages.std(correction=0) + 1e-10)
+def standardized(advantages: Tensor, among: Tensor | None = None) -> Tensor:
+    """Brought to mean 0 and deviation 1, of all of them or of those that are given."""
+    among = advantages if among is None else among
+    return (advantages - among.mean()) / (among.std(correction=0) + 1e-10)

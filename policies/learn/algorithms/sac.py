@@ -113,7 +113,7 @@ class Sac:
         hyperparameters = self.hyperparameters
         statistics: list[dict[str, float]] = []
         collected: list[tuple[Tensor, Tensor]] = []
-        rounds = -(-_ITERATION_STEPS // self.replay.env_count)
+        before, rounds = self.steps, -(-_ITERATION_STEPS // self.replay.env_count)
         for _round in range(rounds):
             collected.append(self._collect())
             self.networks.set_learning_rate(self._learning_rate())
@@ -124,7 +124,7 @@ class Sac:
         rewards, is_ended = (torch.stack(column) for column in zip(*collected, strict=True))
         now = self.networks.temperatures() | {"Policy/Learning Rate": self._learning_rate()}
         now |= self._episode_rewards.add(rewards, is_ended)
-        return Iteration(rounds * self.replay.env_count, self.task.task.take_scores(), means(statistics) | now)
+        return Iteration(self.steps - before, self.task.task.take_scores(), means(statistics) | now)
 
     def restart(self) -> None:
         """Begins an episode in every environment; hindsight takes it for another than the running one."""
@@ -153,10 +153,14 @@ class Sac:
             is_terminated=task.is_terminated,
             is_ended=is_ended,
         )
-        self.replay.add(made)
-        self.policy.body.normalize(observations)
-        self.steps += self.replay.env_count
-        return self._rewards(made.transitions()), is_ended
+        is_skipped = task.is_skipped
+        is_decided = slice(None) if is_skipped is None else ~is_skipped
+        if count := len(observations[is_decided]):
+            self.replay.add(made, is_skipped)
+            self.policy.body.normalize(observations[is_decided])
+        self.steps += count
+        rewards = self._rewards(made.transitions())
+        return rewards if is_skipped is None else rewards.masked_fill(is_skipped[:, None], 0.0), is_ended
 
     def _rewards(self, transitions: Transitions) -> Tensor:
         """Of every signal times its strength, shape (B, signals)."""

@@ -58,6 +58,7 @@ class Replay:
         self.rounds = 0  # written since the beginning
         self._widths = [observation_size, observation_size, *action_sizes, 1, 1, 1]
         self.rows = torch.zeros(self.slots, env_count, sum(self._widths), device=device)
+        self._is_skipped: Tensor | None = None  # (slots, envs), what is never drawn; None: nothing
 
     @property
     def capacity(self) -> int:
@@ -68,8 +69,17 @@ class Replay:
         """Transitions that lie in the ring."""
         return min(self.rounds, self.slots) * self.env_count
 
-    def add(self, transitions: ReplayBatch) -> None:
-        """Writes one round, a transition of every environment, over the oldest."""
+    def add(self, transitions: ReplayBatch, is_skipped: Tensor | None = None) -> None:
+        """Writes one round, a transition of every environment, over the oldest.
+
+        Args:
+            transitions: of all environments.
+            is_skipped: which of them are none and are never drawn, shape (envs,); not all of them.
+        """
+        if is_skipped is not None and self._is_skipped is None:
+            self._is_skipped = torch.zeros(self.rows.shape[:2], dtype=torch.bool, device=self.rows.device)
+        if self._is_skipped is not None:
+            self._is_skipped[self.rounds % self.slots] = False if is_skipped is None else is_skipped
         parts = (
             transitions.observations,
             transitions.next_observations,
@@ -87,7 +97,13 @@ class Replay:
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         """Places in the ring, uniformly and with replacement, shape (count,): slot x environments + environment."""
-        return torch.randint(len(self), (count,), generator=generator, device=self.rows.device)
+        drawn = torch.randint(len(self), (count,), generator=generator, device=self.rows.device)
+        while self._is_skipped is not None:
+            again = self._is_skipped.flatten()[drawn].nonzero()[:, 0]
+            if not len(again):
+                break
+            drawn[again] = torch.randint(len(self), (len(again),), generator=generator, device=self.rows.device)
+        return drawn
 
     def take(self, indices: Tensor) -> ReplayBatch:
         """Copies of the transitions at these indices."""
@@ -98,9 +114,14 @@ class Replay:
 
     def state(self) -> dict[str, Any]:
         """What has been written."""
-        return {"rounds": self.rounds, "rows": self.rows[: min(self.rounds, self.slots)].clone()}
+        written = slice(min(self.rounds, self.slots))
+        skipped = {} if self._is_skipped is None else {"is_skipped": self._is_skipped[written].clone()}
+        return {"rounds": self.rounds, "rows": self.rows[written].clone(), **skipped}
 
     def load_state(self, state: Mapping[str, Any]) -> None:
         """Restores what `state` returned, of a ring of the same size."""
         self.rounds = state["rounds"]
         self.rows[: len(state["rows"])] = state["rows"]
+        if "is_skipped" in state:
+            self._is_skipped = torch.zeros(self.rows.shape[:2], dtype=torch.bool, device=self.rows.device)
+            self._is_skipped[: len(state["rows"])] = state["is_skipped"]

@@ -22,7 +22,8 @@ class Batch:
     """Rows of a rollout, B of them; of recurrent policies, sequences after one another step by step."""
 
     rows: Tensor  # (B,), indices into the flat rollout
-    observation: Observation  # (B, ...)
+    observation: Observation  # (B, ...); of recurrent policies with the steps between their episodes
+    counted: Tensor | None  # (B,), which rows of the observation the others are; None: all of them
     actions: Actions  # (B, ...)
     log_probs: Tensor  # (B, heads)
     values: Tensor  # (B, signals)
@@ -85,6 +86,7 @@ class Rollout:
         self.rewards = zeros(steps, envs)  # of the task
         self.is_terminated = zeros(steps, envs, dtype=torch.bool)
         self.is_truncated = zeros(steps, envs, dtype=torch.bool)
+        self.is_skipped: Tensor | None = None  # (T, N), steps that were no decisions; None: there are none
         self.values = zeros(steps, envs, signal_count)
         self.advantages = zeros(steps, envs)  # of all signals together
         self.returns = zeros(steps, envs, signal_count)
@@ -100,8 +102,22 @@ class Rollout:
     @property
     def is_start(self) -> Tensor:
         """Where an episode starts with the decision, shape (T, N); not told of the first decision."""
-        is_over = self.is_over
-        return torch.cat((torch.zeros_like(is_over[:1]), is_over[:-1]))
+        is_cut = self.is_cut
+        return torch.cat((torch.zeros_like(is_cut[:1]), is_cut[:-1]))
+
+    @property
+    def is_cut(self) -> Tensor:
+        """Where what follows belongs to another episode, shape (T, N)."""
+        return self.is_over if self.is_skipped is None else self.is_over | self.is_skipped
+
+    @property
+    def decision_count(self) -> int:
+        """Decisions that lie here."""
+        return self.rewards.numel() if self.is_skipped is None else int((~self.is_skipped).sum())
+
+    def decided(self, part: Tensor) -> Tensor:
+        """What was decided of a part (T, N, ...): itself, or shape (1, decisions, ...) where steps were skipped."""
+        return part if self.is_skipped is None else part[~self.is_skipped][None]
 
     def next_observations(self) -> Tensor:
         """What came of each decision; where the episode ended, what it saw last. Shape (T, N, observation)."""
@@ -111,6 +127,13 @@ class Rollout:
         """Notes what the first decision sees."""
         self.observation.write(0, task.observation)
         self.final_images.clear()
+        self.is_skipped = None
+
+    def skip(self, t: int, is_skipped: Tensor) -> None:
+        """Leaves out the steps `t` of some environments, shape (N,)."""
+        if self.is_skipped is None:
+            self.is_skipped = torch.zeros_like(self.is_terminated)
+        self.is_skipped[t] = is_skipped
 
     def record(self, t: int, actions: Actions, log_probs: Tensor, task: TaskTensors) -> None:
         """Notes the decision `t` and what came of it; what it saw lies here already."""
@@ -164,8 +187,11 @@ class Rollout:
         length = self.sequence_length
         steps, envs = self.rewards.shape
         count = steps * envs // length
+        used = None if self.is_skipped is None else _used(self.is_skipped, length)
+        count = count if used is None else len(used)
         size = min(max(batch_size // length, 1), count)
         order = torch.randperm(count, generator=generator, device=self.rewards.device)
+        order = order if used is None else used[order]
         for first in range(0, count - size + 1, size):
             yield self._batch(order[first : first + size])
 
@@ -187,9 +213,14 @@ class Rollout:
         def pick(stored: Tensor) -> Tensor:
             return stored.flatten(0, 1).index_select(0, rows)
 
+        observation, counted = self.observation[:-1].mapped(pick), None
+        if self.is_skipped is not None:
+            counted = (~pick(self.is_skipped)).nonzero()[:, 0]
+            rows = rows[counted]
         return Batch(
             rows,
-            self.observation[:-1].mapped(pick),
+            observation,
+            counted,
             Actions(pick(self.actions.continuous), pick(self.actions.branches)),
             pick(self.log_probs),
             pick(self.values),
@@ -197,3 +228,9 @@ class Rollout:
             pick(self.returns),
             sequences,
         )
+
+
+def _used(is_skipped: Tensor, length: int) -> Tensor:
+    """The sequences (sequence, env), flat, in which something was decided."""
+    steps, envs = is_skipped.shape
+    return (~is_skipped).view(steps // length, length, envs).any(1).flatten().nonzero()[:, 0]

@@ -35,6 +35,12 @@ class TaskTensors:
         self._continuous = _actions(buffers.continuous)
         self._branches = _actions(buffers.branches)
 
+    @property
+    def is_skipped(self) -> Tensor | None:
+        """In which rows the last step was no decision, shape (envs,); None: in no row of any step."""
+        is_skipped = self.task.is_skipped
+        return None if is_skipped is None else torch.from_numpy(is_skipped).to(self.device)
+
     def step(self, continuous: Tensor, branches: Tensor) -> None:
         """One decision of all environments.
 

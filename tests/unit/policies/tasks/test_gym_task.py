@@ -149,7 +149,7 @@ def test_arguments_of_the_environment_are_settings():
     assert task.envs.envs[0].unwrapped.g == 1.5
     with pytest.raises(UnknownTask, match=r"gym:Pendulum-v1: cannot be made: .*unexpected keyword argument 'gravity'"):
         build_task("gym:Pendulum-v1", 1, settings_of("gym:Pendulum-v1", ["gravity=1.5"]))
-    with pytest.raises(UnknownTask, match="vectorization: must be sync or async"):
+    with pytest.raises(UnknownTask, match="vectorization: must be sync, async or vector_entry_point"):
         settings_of("gym:Pendulum-v1", ["vectorization=both"])
 
 
