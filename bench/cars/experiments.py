@@ -36,6 +36,7 @@ class Section:
     experiments: tuple[Experiment, ...]
     images: tuple[Image, ...] = ()
     remarks: str = ""  # under the table
+    failures: str = ""  # under the images: a picture that another command makes
 
 
 ROLLER_BALL = Experiment(
@@ -132,6 +133,12 @@ faster obstacles in the first half, larger buffers and sharpening, 8 million ste
 nothing, -6 was stopped after 6 million steps at 90.6 % of the drawn episodes, as the five seeds had by then, and -4
 with less entropy after 4 million at 84 %."""
 
+_HEADLINE_FAILURES = """\
+![Parking that failed, from above](images/failed-parking.png)
+
+Failures of the improved policies that ship, the first of each kind and the next, of 500 episodes on new spots
+(`python -m docs.generate.failed_parking`): car blue, spot red, portals green, and what moves with its last second."""
+
 _LIKE_FOR_LIKE_WORDS = """\
 The document trained on one goal (PPO) and on three (PPO + GAIL); the rows above on some 500 cells of 1 m all over the
 arena, one of which every test cell touches. Here our recipe for 2 million steps on the document's own goals, judged
@@ -181,6 +188,7 @@ SECTIONS: tuple[Section, ...] = (
             ),
         ),
         _HEADLINE_REMARKS,
+        _HEADLINE_FAILURES,
     ),
     Section(
         "Learning to Drive: five variants",

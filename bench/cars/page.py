@@ -78,6 +78,8 @@ def _section(section: Section, results: Mapping[str, Sequence[Result]]) -> str:
     for image in section.images:
         if _drawn(image, results):
             lines += ["", f"![{image.title}](images/{image.name}.png)"]
+    if section.failures:
+        lines += ["", section.failures]
     return "\n".join(lines) + "\n"
 
 

@@ -60,6 +60,21 @@ class ParkingView:
         self.box((*middle, *nose), (params["car_width_m"], params["car_length_m"]), VEHICLE)
         self.line(middle, middle + nose * params["car_length_m"] / 2, _FLOOR, 2)
 
+    def portals(self) -> None:
+        """Where the storeys are left."""
+        for x, z, yaw_deg in PORTAL_POSITIONS:
+            yaw_rad = np.radians(yaw_deg)
+            self.box((x, z, np.sin(yaw_rad), np.cos(yaw_rad)), (PORTAL_SIZE[0], 0.4), _PORTAL)
+
+    def mover(self, pose: Any, params: dict[str, float], colour: Rgb = OBSTACLE) -> None:
+        """A capsule."""
+        radius = params["mover_radius_m"]
+        reach = max(0.0, params["mover_length_m"] / 2 - radius)
+        self.box(pose, (2 * radius, 2 * reach), colour)
+        for side in (-1.0, 1.0):
+            end = self.position(float(pose[0] + side * reach * pose[2]), float(pose[1] + side * reach * pose[3]))
+            self.canvas.disc(end, radius, colour)
+
     def rays(self, pos: Any, yaw_rad: float, casts: NDArray[np.float32], params: dict[str, float]) -> None:
         """Each ray as far as it got, in the sensor's order; `casts` are their fractions."""
         spacing = np.radians(params["ray_degrees"]) / max(1, len(casts) // 2)
@@ -92,22 +107,11 @@ def top_view_of(task: Any, i_env: int, height_px: int) -> NDArray[np.uint8]:
     image.box(world.goal.numpy()[i_env], (params["pad_width_m"], params["pad_length_m"]), GOAL)
     image.rays(pos, yaw_rad, ray_fractions(task, i_env), params)
     if is_level_2:
-        _draw_level_2(image, task, i_env, params)
+        image.portals()
+        for pose in task.movers.numpy()[i_env]:
+            image.mover(pose, params)
     else:
         for block in task.blocks.numpy()[i_env]:
             image.box(block, (params["block_width_m"], params["block_length_m"]), OBSTACLE)
     image.car(pos, yaw_rad, params)
     return image.canvas.pixels
-
-
-def _draw_level_2(image: ParkingView, task: Any, i_env: int, params: dict[str, float]) -> None:
-    for x, z, yaw_deg in PORTAL_POSITIONS:
-        yaw_rad = np.radians(yaw_deg)
-        image.box((x, z, np.sin(yaw_rad), np.cos(yaw_rad)), (PORTAL_SIZE[0], 0.4), _PORTAL)
-    radius = params["mover_radius_m"]
-    reach = max(0.0, params["mover_length_m"] / 2 - radius)
-    for mover in task.movers.numpy()[i_env]:
-        image.box(mover, (2 * radius, 2 * reach), OBSTACLE)
-        for side in (-1.0, 1.0):
-            end = image.position(float(mover[0] + side * reach * mover[2]), float(mover[1] + side * reach * mover[3]))
-            image.canvas.disc(end, radius, OBSTACLE)
