@@ -40,13 +40,12 @@ def main(
     numbers = load_policy(drawn_as)[1].samplers() if drawn_as is not None else {}
     found = {path: judged(path, airframe, episodes, numbers) for path in track(policies, "judging", transient=True)}
     table = Table("policy", "in band", "collided")
-    best_first = sorted(found.items(), key=lambda pair: -pair[1].in_band.low)
-    for path, card in best_first:
-        table.add_row(str(path), written(card.in_band, "%"), written(card.collision, "%"))
+    ordered = best_first({path: card.in_band for path, card in found.items()})
+    for path in ordered:
+        table.add_row(str(path), written(found[path].in_band, "%"), written(found[path].collision, "%"))
     Console().print(table)
     if out is not None:
-        best, card = best_first[0]
-        write_judged(best, out, MEASURES["in_band"], card.in_band, episodes)
+        write_judged(ordered[0], out, MEASURES["in_band"], found[ordered[0]].in_band, episodes)
 
 
 def judged(path: Path, airframe: str, episodes: int, numbers: Mapping[str, Sampler]) -> Scorecard:
@@ -61,10 +60,15 @@ def judged(path: Path, airframe: str, episodes: int, numbers: Mapping[str, Sampl
     return scorecard(tracks)
 
 
+def best_first(found: Mapping[Path, Interval]) -> list[Path]:
+    """Policies by where their intervals begin, the highest first."""
+    return sorted(found, key=lambda path: -found[path].low)
+
+
 def best_of(paths: Sequence[Path], figure: str) -> tuple[Path, Interval]:
     """The policy whose interval of a figure of the scorecard begins highest, and that interval."""
     found = {path: getattr(judged(path, WIDE, EPISODES, {}), figure) for path in paths}
-    best = max(found, key=lambda path: found[path].low)
+    best = best_first(found)[0]
     return best, found[best]
 
 

@@ -121,15 +121,17 @@ class GoalGuard:
         scale, most = self._trust(age_s, dark_s)
         (velocity, yaw_rate) = wanted
         level = np.array(velocity[:2])
-        kept = scale * level
-        kept *= min(1.0, min(most, self.settings.speed_max) / max(float(np.hypot(*kept)), 1e-6))
+        kept = self._capped(scale * level, most)
         self._count(TOO_FAST if self.stance is GoalStance.FREE else self.stance.value, level, kept)
         if self.stance is GoalStance.FREE and is_tilted(own.q_ned_from_frd, self.settings):
-            own_level = np.array(own.vel_ned[:2])
-            own_level *= min(1.0, self.settings.speed_max / max(float(np.hypot(*own_level)), 1e-6))
-            kept = np.zeros(2) if self._drives else own_level  # asks for no more tilt
+            kept = np.zeros(2) if self._drives else self._capped(np.array(own.vel_ned[:2]))  # asks for no more tilt
             self.interventions.note(TILTED)
         return self._bounded(kept, scale * velocity[2], yaw_rate, own, age_s)
+
+    def _capped(self, level: Floats, most: float = np.inf) -> Floats:
+        """A level velocity that is no faster than it ever may be, nor than this [m/s]."""
+        capped: Floats = level * min(1.0, min(most, self.settings.speed_max) / max(float(np.hypot(*level)), 1e-6))
+        return capped
 
     def begin(self, own: Own) -> None:
         """The policy takes over."""

@@ -1,12 +1,14 @@
 """The reproduction of following: order of stages, results kept whole, and a page that says what they say."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bench.cars.result import Point
 from bench.follow.__main__ import published, unpublished
+from bench.follow.choice import best_first
 from bench.follow.page import duration, write_page
 from bench.follow.result import Judged, Result, read, read_all, write, write_all
 from bench.follow.stages import CELLS, OWNER_SPEEDS, STAGES, in_order
@@ -118,3 +120,9 @@ def test_of_several_seeds_the_chosen_is_published_whichever_shipped_and_says_wha
 @pytest.mark.parametrize(("seconds", "text"), [(90.0, "90 s"), (900.0, "15.0 min"), (7200.0, "2.0 h")])
 def test_durations_are_as_people_say_them(seconds, text):
     assert duration(seconds) == text
+
+
+def test_the_best_is_whose_interval_begins_highest_and_of_equals_the_first():
+    found = {Path(name): Interval(value, low, 1.0) for name, value, low in (("a", 0.9, 0.7), ("b", 0.8, 0.8))}
+    found |= {Path("c"): Interval(0.95, 0.8, 1.0)}
+    assert best_first(found) == [Path("b"), Path("c"), Path("a")]
