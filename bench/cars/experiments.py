@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from bench.cars.done_right import HILL, MEMORY, OTHERS, SPARSE
-from bench.cars.experiment import NEW_SPOTS, PARKING2_SPOTS, VALIDATION, Experiment, Judged
+from bench.cars.experiment import NEW_SPOTS, OTHER_DRAWS, PARKING2_SPOTS, VALIDATION, Experiment, Judged
 from bench.cars.few_goals import FEW_GOALS, QUARTER_ANYWHERE, QUARTERS
 
 VARIANTS = ("A0", "A1", "A2", "A3", "A4")
@@ -39,14 +39,23 @@ class Section:
 
 
 ROLLER_BALL = Experiment(
-    "roller-ball", "RollerBall", "roller-ball", document="~100 % after 20-30k steps", target=0.99, limit_s=10.0
+    "roller-ball",
+    "RollerBall",
+    "roller-ball",
+    judged=(Judged("held out"), OTHER_DRAWS),
+    document="~100 % after 20-30k steps",
+    target=0.99,
+    limit_s=10.0,
 )
 
 REACH = Experiment(
     "reach-target",
     "ReachTarget, ours",
     "reach-target",
-    judged=(Judged("target reached in 40 s", {"preset": "as-coded", "split": "test"}),),
+    judged=(
+        Judged("target reached in 40 s", {"preset": "as-coded", "split": "test"}),
+        replace(VALIDATION, label="validation targets", settings={"preset": "as-coded", "split": "validation"}),
+    ),
     target=0.99,
     limit_s=120.0,
 )
@@ -65,13 +74,19 @@ REACH_CURVES = tuple(
 )
 
 PARKING1 = Experiment(
-    "parking1", "Parking 1, PPO", "parking1", judged=(NEW_SPOTS,), document="13 %, 12 h", target=0.99, limit_s=120.0
+    "parking1",
+    "Parking 1, PPO",
+    "parking1",
+    judged=(NEW_SPOTS, VALIDATION),
+    document="13 %, 12 h",
+    target=0.99,
+    limit_s=120.0,
 )
 PARKING1_GAIL = Experiment(
     "parking1-gail",
     "Parking 1, PPO + GAIL",
     "parking1-gail",
-    judged=(NEW_SPOTS,),
+    judged=(NEW_SPOTS, VALIDATION),
     document="92 %, 12 h",
     target=0.99,
     limit_s=120.0,
@@ -80,7 +95,7 @@ PARKING2 = Experiment(
     "parking2",
     "Parking 2",
     "parking2",
-    judged=PARKING2_SPOTS,
+    judged=(*PARKING2_SPOTS, VALIDATION),
     document="32.8 / 47.2 / 22.8 %, 4 to 6 days",
     target=0.97,
     limit_s=600.0,
