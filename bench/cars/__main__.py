@@ -15,9 +15,10 @@ from rich.console import Console
 from bench.cars.experiment import Experiment
 from bench.cars.experiments import EXPERIMENTS, SECTIONS
 from bench.cars.page import DOCS, write_page
-from bench.cars.result import Result, read, read_all, write, write_all
+from bench.cars.result import Evaluated, Result, read, read_all, write, write_all
+from bench.judged_card import write_judged
 from bench.side_by_side import Job, run_side_by_side
-from common.files import write_whole
+from common.intervals import Interval, wilson_interval
 
 RESULTS = Path("results/cars")
 RUNS = DOCS / "cars.jsonl"
@@ -65,20 +66,23 @@ def results() -> dict[str, list[Result]]:
 
 
 def _publish(there: dict[str, list[Result]]) -> None:
-    """Puts policies of the headline into policies/pretrained/."""
+    """Puts the best policies of the headline into policies/pretrained/, their cards with how they were judged."""
     for experiment in SECTIONS[0].experiments:
-        trained = RESULTS / f"{experiment.name}-{shipped_seed(experiment, there.get(experiment.name, ()))}.pt"
-        if trained.exists():
-            write_whole(PRETRAINED / f"{experiment.name}.pt", trained.read_bytes())
+        if (best := shipped(experiment, there.get(experiment.name, ()))) is None:
+            continue
+        seed, judged = best
+        if (trained := RESULTS / f"{experiment.name}-{seed}.pt").exists():
+            found = Interval(judged.successes / judged.episodes, *wilson_interval(judged.successes, judged.episodes))
+            write_judged(trained, PRETRAINED / f"{experiment.name}.pt", "success", found, judged.episodes)
 
 
-def shipped_seed(experiment: Experiment, runs: Sequence[Result]) -> int:
-    """The seed whose policy ships: the one that did best where the experiment says so, or the first."""
+def shipped(experiment: Experiment, runs: Sequence[Result]) -> tuple[int, Evaluated] | None:
+    """The seed whose policy ships, and what it came to where the experiment chooses; none where it does not."""
     for k, judged in enumerate(experiment.judged):
         if judged.chooses and runs:
-            found = [(result.evaluations[k].successes, -result.seed) for result in runs]
-            return -max(found)[1]
-    return 1
+            best = max(runs, key=lambda result: (result.evaluations[k].successes, -result.seed))
+            return best.seed, best.evaluations[k]
+    return None
 
 
 def _is_of(path: Path, name: str) -> bool:

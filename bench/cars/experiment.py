@@ -33,6 +33,7 @@ class Experiment:
 
 NEW_SPOTS = Judged("new spots", {"split": "test"})
 VALIDATION = Judged("validation spots", {"split": "validation"}, episodes=4000, chooses=True)
+OTHER_DRAWS = Judged("validation draws", episodes=4000, chooses=True)  # of a task whose splits are alike
 PARKING2_SPOTS = (
     Judged("training spots", {"split": "train"}),
     Judged("new spots, storey 1", {"split": "test", "storey": "1"}),

@@ -12,7 +12,7 @@ Nothing here knows torch or Gymnasium.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 import warp as wp
@@ -27,7 +27,8 @@ from policies.tasks.reshaping import Array, Decision, Reshaping
 from policies.tasks.task_params import NumberError, Sampler, TaskParam, TaskParamTable
 
 Preset = Literal["as-documented", "as-coded", "improved"]
-Split = Literal["train", "test"]
+Split = Literal["train", "validation", "test"]
+SPLITS: tuple[Split, ...] = get_args(Split)
 
 
 class TaskSettings(BaseModel):
@@ -42,7 +43,8 @@ class TaskSettings(BaseModel):
     preset: Preset = "as-coded"
     """`as-documented` (the text), `as-coded` (the published code) or `improved` (ours)."""
     split: Split = "train"
-    """`train` or `test`: which of the two disjoint sets of places goals are drawn from."""
+    """`train`, `test`, or `validation`, by which to choose among policies: disjoint sets of places of goals, and where
+    there are worlds, paths, noise and starts also of these."""
     stack: int = Field(default=0, ge=0, le=50)
     """Observations in a stack; 0: as the preset has it."""
 

@@ -7,7 +7,7 @@ the other even ones in validation.
 import warp as wp
 
 from common.rng import draw_key
-from policies.tasks.flight.settings import SPLITS
+from policies.tasks.task import SPLITS
 
 wp.set_module_options({"enable_backward": False})
 

@@ -12,7 +12,7 @@ import numpy as np
 from autopilot.params import parameter_table
 from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
-from policies.tasks.flight.settings import SPLITS, RigSplit
+from policies.tasks.task import SPLITS, Split
 from sim.bodies.vehicles import class_of
 from sim.hovering import Hover, fly_to_hover
 from sim.rig import Rig, Rows
@@ -65,7 +65,7 @@ def hover_bank(
     has_estimator: bool,
     device: str,
     heights_m: tuple[float, float] = LOW_M,
-    split: RigSplit = "train",
+    split: Split = "train",
     airframes: tuple[str, ...] = (AIRFRAME,),
 ) -> Rig:
     """Vehicles that hover above home, between two heights, each with a heading of its own; as many of each airframe."""
@@ -97,7 +97,7 @@ def _on_the_ground(has_estimator: bool, device: str, count: int, airframe_name: 
 
 
 def _hovering(
-    has_estimator: bool, device: str, heights_m: tuple[float, float], split: RigSplit, airframe_name: str
+    has_estimator: bool, device: str, heights_m: tuple[float, float], split: Split, airframe_name: str
 ) -> Rig:
     seed = SPLITS.index(split)
     rig = _on_the_ground(has_estimator, device, HOVER_COUNT, airframe_name, seed)

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from policies.tasks.flight.episode_start import Start
 from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT, Makes
 from policies.tasks.flight.hover_bank import AIRFRAME, LOW_M, build_rig, hover_bank
-from policies.tasks.flight.settings import SPLITS, RigSplit
 from policies.tasks.layout import Layout
-from policies.tasks.task import Task
+from policies.tasks.task import SPLITS, Split, Task
 from policies.tasks.task_params import Sampler
 from sim.restore import RowRestore
 from sim.rig import Rig
@@ -40,7 +39,7 @@ class RigTask(Task):
         number_defaults: Mapping[str, float | Sampler],
         device: str,
         hover_heights_m: tuple[float, float] = LOW_M,
-        split: RigSplit = "train",
+        split: Split = "train",
         airframes: tuple[str, ...] = (AIRFRAME,),
         sensors: Callable[[float], SensorModel] = sensor_model,
         bank: Rig | None = None,

@@ -13,7 +13,7 @@ import warp as wp
 from autopilot.control.law import ControlLaw
 from autopilot.navigator.setpoint import SetpointPort
 from policies.tasks.flight.hover_bank import PLAIN, build_rig
-from policies.tasks.flight.settings import SPLITS, RigSplit
+from policies.tasks.task import SPLITS, Split
 from sim.advance import rig_arrays
 from sim.bodies.body import Body
 from sim.hovering import ALIGN_TICKS
@@ -48,7 +48,7 @@ def standing_bank(
     sensors: Callable[[float], SensorModel],
     has_estimator: bool,
     device: str,
-    split: RigSplit = "train",
+    split: Split = "train",
 ) -> Rig:
     """Vehicles that stand at home on level ground, armed and braked, evenly in all directions, of each split others."""
     seed = SPLITS.index(split)

@@ -57,8 +57,6 @@ class ParkingSettings(TaskSettings):
         "storey",
     }
 
-    split: Literal["train", "validation", "test"] = "train"  # type: ignore[assignment]  # others have no `validation`
-    """`train`, `test`, or `validation`, by which to choose among policies: disjoint sets of places of goals."""
     quarter: int = Field(default=0, ge=0, le=4)
     """Which quarter of each storey the test places are: 1 (low x and z), 2 (high x), 3 (high z), 4 (high x and z); 0:
     cells all over it."""

@@ -26,6 +26,7 @@ from policies.tasks.reach_target.car_model import (
     is_chassis_hit,
 )
 from policies.tasks.reach_target.reach_target_params import ReachParams
+from policies.tasks.task import SPLITS
 
 wp.set_module_options({"enable_backward": False})
 
@@ -56,10 +57,13 @@ _TINY = wp.constant(1e-6)
 
 _YAW_STREAM = wp.constant(1)
 _TARGET_STREAM = wp.constant(64)  # and one more for each target that follows in the same episode
-_SPLIT_SEED = wp.constant(20260)  # fixes which squares of the ground are test squares
+_TRAIN = wp.constant(SPLITS.index("train"))
+_VALIDATION = wp.constant(SPLITS.index("validation"))
+_TEST = wp.constant(SPLITS.index("test"))
+_SPLIT_SEED = wp.constant(20260)  # fixes which squares of the ground belong to which split
 _SPLIT_SQUARE_M = wp.constant(2.0)
-_SPLIT_PERIOD = wp.constant(10)  # one square in so many is a test square
-_SPLIT_TRIES = wp.constant(256)  # 0.9^256 = 2e-12: the chance that a test target lies in a training square
+_SPLIT_PERIOD = wp.constant(10)  # one square in so many is a test square, and one a validation square
+_SPLIT_TRIES = wp.constant(256)  # 0.9^256 = 2e-12: the chance that a test target lies in another's square
 _PLATFORMS = wp.constant(16)  # stacked in the published scene,
 _PLATFORM_DROP_M = wp.constant(20.0)  # so far apart
 
@@ -73,7 +77,7 @@ class ReachRules:
     success: int
     is_start_anywhere: int
     is_split: int
-    is_test: int
+    split: int  # a place in SPLITS
     is_stacked: int
     does_contact_end: int
 
@@ -168,11 +172,16 @@ def is_reached(rules: ReachRules, n: ReachParams, motion: Motion, target: wp.vec
 
 
 @wp.func
-def is_test_square(x: float, z: float) -> bool:
-    """Whether the ground there belongs to the test set."""
+def split_of_square(x: float, z: float) -> int:
+    """What the ground there belongs to, a place in SPLITS."""
     a = int(wp.floor(x / _SPLIT_SQUARE_M))
     b = int(wp.floor(z / _SPLIT_SQUARE_M))
-    return wp.randi(draw_key(_SPLIT_SEED, a, b, 0), 0, _SPLIT_PERIOD) == 0
+    number = wp.randi(draw_key(_SPLIT_SEED, a, b, 0), 0, _SPLIT_PERIOD)
+    if number == 0:
+        return _TEST
+    if number == 1:
+        return _VALIDATION
+    return _TRAIN
 
 
 @wp.func
@@ -185,7 +194,7 @@ def draw_target(buffers: StepBuffers, state: ReachState, rules: ReachRules, i: i
     yaw = wp.randf(rng, -_PI, _PI)
     if rules.is_split != 0:
         for _try in range(_SPLIT_TRIES):
-            if is_test_square(x, z) == (rules.is_test != 0):
+            if split_of_square(x, z) == rules.split:
                 break
             x = wp.randf(rng, -half, half)
             z = wp.randf(rng, -half, half)

@@ -30,7 +30,7 @@ from policies.tasks.reach_target.kernel import (
 )
 from policies.tasks.reach_target.reach_target_params import PARAMS, ReachParams
 from policies.tasks.reach_target.settings import ReachSettings
-from policies.tasks.task import Task
+from policies.tasks.task import SPLITS, Task
 from policies.tasks.task_params import typed_rows
 from policies.tasks.top_view import GOAL, GOOD, INK, OBSTACLE, VEHICLE, Canvas
 
@@ -142,7 +142,7 @@ def _rules(settings: ReachSettings) -> ReachRules:
     rules.success = SUCCESSES.index(settings.success)
     rules.is_start_anywhere = int(settings.start == "anywhere")
     rules.is_split = int(settings.goals == "split")
-    rules.is_test = int(settings.split == "test")
+    rules.split = SPLITS.index(settings.split)
     rules.is_stacked = int(settings.heights == "stacked")
     rules.does_contact_end = int(settings.preset != "as-documented")  # the article names falling only
     return rules

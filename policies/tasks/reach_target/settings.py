@@ -35,8 +35,8 @@ class ReachSettings(TaskSettings):
     start: Start | Literal["auto"] = "auto"
     """`centre`, and after a success where the car is; or `anywhere`."""
     goals: Goals | Literal["auto"] = "auto"
-    """`everywhere`, whatever the split: held-out episodes are new draws; or `split`: training and test targets lie in
-    disjoint squares of the platform."""
+    """`everywhere`, whatever the split: held-out episodes are new draws; or `split`: the targets of the
+    three splits lie in disjoint squares of the platform."""
     heights: Heights = "local"
     """`stacked`: world heights as the published scene shows them to A0-A2, 20 m lower for each of 16 platforms."""
 

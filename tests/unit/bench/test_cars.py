@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from bench.cars.__main__ import RUNS, shipped_seed
+from bench.cars.__main__ import RUNS, shipped
 from bench.cars.experiment import NEW_SPOTS, VALIDATION, Experiment
-from bench.cars.experiments import EXPERIMENTS
+from bench.cars.experiments import EXPERIMENTS, SECTIONS
 from bench.cars.page import DOCS, page_text
 from bench.cars.result import Evaluated, Result, read_all
 from bench.cars.run import configured, with_settings
@@ -63,6 +63,13 @@ def run(seed, *successes):
 
 def test_the_seed_that_ships_is_the_best_by_validation_not_by_test():
     experiment = Experiment("some", "Some", "parking1", judged=(NEW_SPOTS, VALIDATION))
-    assert shipped_seed(experiment, [run(1, 99, 90), run(2, 97, 95), run(3, 98, 95)]) == 2
-    assert shipped_seed(experiment, []) == 1
-    assert shipped_seed(Experiment("other", "Other", "parking1"), [run(1, 80), run(2, 90)]) == 1
+    seed, judged = shipped(experiment, [run(1, 99, 90), run(2, 97, 95), run(3, 98, 95)])
+    assert (seed, judged.successes) == (2, 95)
+    assert shipped(experiment, []) is None
+    assert shipped(Experiment("other", "Other", "parking1"), [run(1, 80), run(2, 90)]) is None
+
+
+@pytest.mark.parametrize("experiment", SECTIONS[0].experiments, ids=lambda experiment: experiment.name)
+def test_every_policy_of_the_headline_is_chosen_among_three_seeds_and_more(experiment):
+    assert experiment.seeds >= 3
+    assert sum(judged.chooses for judged in experiment.judged) == 1

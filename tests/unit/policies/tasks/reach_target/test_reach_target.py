@@ -225,14 +225,17 @@ def test_starts_and_targets_lie_where_the_published_scene_puts_them():
     assert len(np.unique(np.round(degrees))) > 340
 
 
-def test_training_and_test_goals_share_no_square_of_the_ground():
+def test_goals_of_training_of_validation_and_of_tests_share_no_square_of_the_ground():
     def squares(split):
         task = built(8192, preset="improved", split=split)
         return {tuple(square) for square in np.floor(task.world.target.numpy()[:, [0, 2]] / 2.0).astype(int)}
 
-    train, test = squares("train"), squares("test")
+    train, validation, test = squares("train"), squares("validation"), squares("test")
     assert not train & test
+    assert not train & validation
+    assert not validation & test
     assert len(test) > 150  # of 2,209 squares every tenth
+    assert len(validation) > 150
     assert len(train) > 1500
 
 
