@@ -1,26 +1,31 @@
-"""After somebody with a phone and a blue shirt: where they are is the goal of a skill that goes to goals.
+"""After somebody with a phone: where they are is the goal of a skill that goes to goals.
 
 In: images of the onboard camera, the phone's reports, telemetry. Out: a goal that moves with the owner, and how fast
-whoever goes there may be: it stays behind them, the farther the less is known of where they are.
+whoever goes there may be: it stays behind them, the farther the less is known of where they are. Who they are and where
+the guard's senses say, as those who follow by images have them. Neither seen nor heard of it searches: it goes to where
+they were last seen to go, and stands there until they are seen or it is the end.
 """
 
-from math import dist, nan
+from math import hypot, nan
 
 import numpy as np
 
-from common.attitude import inverse, rotated
 from policies.companion.goals import Goal
+from policies.companion.guard.limits import faded, stopping_speed
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
-from policies.companion.owner_watch import OwnerWatch
+from policies.companion.senses.seen_owner import PersonNow
+from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
-from policies.shirt_detector import chest_hfrd
 from policies.tasks.navigate.walking_goal import CLOSING_HZ
 
 KEPT_M = 1.5  # on the level, from an owner whose place is known
 DEVIATIONS = 2.0  # that it keeps away farther, of the error of their place
 IMAGE_OLD_US = 300_000  # guess: three images missed; then it goes by the phone alone
-SILENT_S = 5.0  # neither seen nor heard of: lost
 LOST = "owner lost"
+AHEAD_S = 4.0  # who is lost is looked for where they would be in so long; guess
+SHORT_OF_M = 2.0  # and no nearer to there than this; guess
+_BRAKE_M_S2 = 1.0  # before there
 
 
 class OwnerGoal:
@@ -29,24 +34,32 @@ class OwnerGoal:
     Args:
         vehicle: whose links it hears.
         camera: the onboard camera.
+        senses: who finds the owner; fed here.
+        settings: when it searches, how fast, and when it is the end.
     """
 
-    def __init__(self, vehicle: VehicleLink, camera: ImageSource) -> None:
-        self._vehicle, self._camera = vehicle, camera
-        self._watch = OwnerWatch()
+    def __init__(self, vehicle: VehicleLink, camera: ImageSource, senses: Senses, settings: GuardSettings) -> None:
+        self._vehicle, self._camera, self._settings = vehicle, camera, settings
+        self._senses, self._watch = senses, senses.watch
+        self._owner: PersonNow | None = None  # by sights, or if those are old by the phone too
         self.done = LOST
+        self.may_search = False
+        """It drives, under a guard: else who is lost is lost at once."""
+        self._is_searching = False  # as told
 
     def frame(self, time_us: int) -> None:
         """Takes in what the camera sees, and what the phone has said."""
-        own, owner, known_us = self._vehicle.own, self._vehicle.owner, self._known_us
+        own, owner = self._vehicle.own, self._vehicle.owner
         image = self._camera.take(time_us)
-        is_new = image is not None and own.boot_us - image.time_us < IMAGE_OLD_US
-        if image is not None and is_new and not 0 <= known_us - image.time_us < IMAGE_OLD_US:
+        if image is not None and abs(own.boot_us - image.time_us) > IMAGE_OLD_US:
+            image = None
+        if image is not None:
             self._vehicle.clock.pictured(image.time_us)
-            down = rotated(inverse(own.q_ned_from_frd), (0.0, 0.0, 1.0))
-            self._watch.update(image.time_us, own, owner, chest_hfrd(image.pixels, down[:2]))
-        elif abs(own.boot_us - known_us) > IMAGE_OLD_US:
+        self._senses.sense(own, owner, image)
+        if abs(own.boot_us - self._known_us) > IMAGE_OLD_US:
             self._watch.update(own.boot_us, own, owner, None)
+        self._owner = self._senses.owner_now(own)
+        self._tell()
 
     @property
     def _known_us(self) -> int:
@@ -54,17 +67,33 @@ class OwnerGoal:
         track = self._watch.track
         return NEVER_US if track is None else track.time_us
 
+    @property
+    def _silence_s(self) -> float:
+        """Since they were seen or heard of."""
+        return self._watch.silence_s(self._vehicle.own.boot_us)
+
     def is_ordered(self) -> bool:
         """Nobody sends it anywhere."""
         return False
 
     @property
+    def is_searching(self) -> bool:
+        """They are neither seen nor heard of, and it may look for them."""
+        s = self._settings
+        return self.may_search and self._senses.seen.sights > 0 and s.search_s < self._silence_s <= s.lost_s
+
+    @property
     def goal(self) -> Goal | None:
-        """Where the owner is; None: lost."""
-        track = self._watch.track
-        if track is None or self._watch.silence_s(self._vehicle.own.boot_us) > SILENT_S:
+        """Where the owner is, or is looked for; None: lost."""
+        if self.is_searching:
+            seen = self._senses.seen
+            place, velocity = seen.now(seen.time_us)
+            north, east = place[:2] + AHEAD_S * velocity[:2]
+            return Goal((float(north), float(east), nan), "where the owner was going")
+        if self._owner is None or self._silence_s > self._settings.search_s:
             return None
-        return Goal((float(track.pos_ned[0]), float(track.pos_ned[1]), nan), "owner")
+        north, east = self._owner.pos_ned[:2]
+        return Goal((float(north), float(east), nan), "owner")
 
     def reached(self) -> Goal | None:
         """It is never over."""
@@ -72,14 +101,25 @@ class OwnerGoal:
 
     @property
     def speed_max_m_s(self) -> float:
-        """Level speed at which it stays behind them."""
-        track = self._watch.track
-        if track is None:
+        """Level speed at which it stays behind them, slower once they are not heard of either, or searches."""
+        owner, goal, s, pos_ned = self._owner, self.goal, self._settings, self._vehicle.own.pos_ned
+        if owner is None or goal is None:
             return 0.0
-        (north, east), pos_ned = track.pos_ned[:2], self._vehicle.own.pos_ned
-        away_m = dist((north, east), pos_ned[:2])
-        kept_m = KEPT_M + DEVIATIONS * float(np.sqrt(0.5 * np.trace(track.pos_cov[:2, :2])))
+        north, east = goal.pos_ned[0] - pos_ned[0], goal.pos_ned[1] - pos_ned[1]
+        away_m = hypot(north, east)
+        if self.is_searching:
+            return min(stopping_speed(away_m - SHORT_OF_M, s.goal_reaction_s, _BRAKE_M_S2), s.search_ahead_speed)
+        kept_m = KEPT_M + DEVIATIONS * float(np.sqrt(0.5 * np.trace(owner.pos_var)))
         if away_m < kept_m:
             return 0.0
-        leaving = ((north - pos_ned[0]) * track.vel_ned[0] + (east - pos_ned[1]) * track.vel_ned[1]) / away_m
-        return max(float(leaving), 0.0) + float(CLOSING_HZ) * (away_m - kept_m)
+        leaving = (north * owner.vel[0] + east * owner.vel[1]) / away_m
+        behind = max(float(leaving), 0.0) + float(CLOSING_HZ) * (away_m - kept_m)
+        return behind * (faded(self._silence_s, s.slow_s, s.stop_s) if self.may_search else 1.0)
+
+    def _tell(self) -> None:
+        """Says when it begins to search, and when they are found."""
+        if self.is_searching is self._is_searching:
+            return
+        self._is_searching = self.is_searching
+        if self._is_searching or self.goal is not None:
+            self._vehicle.say(f"Companion: {'searching the owner' if self._is_searching else 'following'}")

@@ -6,6 +6,7 @@ to have. What is clear is so from the first sample to the last: whoever takes on
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from common.warp_start import start_warp
 from policies.companion.guard.people import Somebody
 from policies.companion.guard.settings import GuardSettings
-from policies.companion.senses.local_map import LocalMap
+from policies.companion.senses.local_map import Clearance, LocalMap
 from policies.companion.vehicle_link import Own
 from policies.tasks.flight.rollout import roll
 
@@ -31,6 +32,15 @@ _SLOWER = 1.5  # how much a metre per second less counts besides: who goes slowe
 _GRAZING = 4.0  # [1/s] how much a metre nearer counts than it should keep off besides, where it may:
 _SLACK_M = 0.25  # so much, since the map, and how a vehicle answers, are known as well as that
 _THAT_WAY = 0.5  # whoever turns by 60 degrees and more does not go there at all
+
+
+@dataclass(frozen=True, slots=True)
+class _Judged:
+    """What becomes of candidates, one element of each."""
+
+    is_clear: NDArray[np.bool_]  # of what is solid, and where nobody has looked
+    is_allowed: NDArray[np.bool_]  # by the rule of people
+    least_m: Floats  # how near it comes to anything
 
 
 class Rollouts:
@@ -49,6 +59,7 @@ class Rollouts:
         hears_s = min(s.hears_s, s.reaction_s)
         inputs = [asked, now, hears_s, s.reaction_s - hears_s, s.brake, s.solid_m, _STEP_S, way]
         self._launch: Any = wp.launch(roll, _MOST, inputs, record_cmd=True)
+        self._launch_one: Any = wp.launch(roll, 1, inputs, record_cmd=True)
 
     def clear_velocity(
         self, wanted: Floats, last: Floats, own: Own, around: LocalMap, people: Sequence[Somebody] = ()
@@ -62,21 +73,15 @@ class Rollouts:
             around: what is known.
             people: who are kept off besides; the wanted velocity does so, as far as it can be.
         """
-        s, here = self._s, np.array(own.pos_ned[:2])
+        s = self._s
         clearance = around.clearance(own.pos_ned, own.boot_us)
-        here_m = float(clearance.at(here)[0])
+        here_m = float(clearance.at(np.array(own.pos_ned[:2]))[0])
+        wants = self._judged(wanted[None], last, own, clearance, here_m, people)
+        if wants.is_clear[0] and wants.is_allowed[0] and wants.least_m[0] >= s.solid_m + _SLACK_M:
+            return wanted  # nothing costs less
         asked = _candidates(wanted, last, s.unseen_speed, is_too_near=here_m < s.solid_m)
-        near_m, is_seen = clearance.at(here + self._rolled(asked, np.array(own.vel_ned[:2]), last))
-        may_be_unseen = np.hypot(asked[:, 0], asked[:, 1]) <= s.unseen_speed + 1e-6
-        is_allowed = np.ones(len(asked), bool)
-        for person in people:
-            is_allowed &= asked @ person.way <= person.closing_max + 1e-6
-            if person.then_m < s.pressed_m:
-                may_be_unseen |= asked @ person.way < 0.0
-        is_blocked = (near_m < _room_m(here_m, s.solid_m)) | ~(is_seen | may_be_unseen[:, None])
-        is_clear = ~is_blocked.any(1)
-        answered = 1 + round(s.reaction_s / _STEP_S)
-        least_m = np.where(is_seen | may_be_unseen[:, None], near_m, 0.0)[:, answered:].min(1)
+        found = self._judged(asked, last, own, clearance, here_m, people)
+        is_clear, is_allowed, least_m = found.is_clear, found.is_allowed, found.least_m
         speed, wanted_speed = np.hypot(*asked.T), float(np.hypot(*wanted))
         is_that_way = asked @ wanted > _THAT_WAY * speed * wanted_speed
         slower = wanted_speed - np.where(is_that_way, np.minimum(speed, wanted_speed), 0.0)
@@ -89,11 +94,28 @@ class Rollouts:
             return np.zeros(2)
         return np.asarray(asked[int(np.argmax(np.where(is_allowed, least_m - 1e-3 * speed, -np.inf)))])
 
+    def _judged(
+        self, asked: Floats, last: Floats, own: Own, clearance: Clearance, here_m: float, people: Sequence[Somebody]
+    ) -> _Judged:
+        """What becomes of candidates, (candidates, 2)."""
+        s, here = self._s, np.array(own.pos_ned[:2])
+        near_m, is_seen = clearance.at(here + self._rolled(asked, np.array(own.vel_ned[:2]), last))
+        may_be_unseen = np.hypot(asked[:, 0], asked[:, 1]) <= s.unseen_speed + 1e-6
+        is_allowed = np.ones(len(asked), bool)
+        for person in people:
+            is_allowed &= asked @ person.way <= person.closing_max + 1e-6
+            if person.then_m < s.pressed_m:
+                may_be_unseen |= asked @ person.way < 0.0
+        is_blocked = (near_m < _room_m(here_m, s.solid_m)) | ~(is_seen | may_be_unseen[:, None])
+        answered = 1 + round(s.reaction_s / _STEP_S)
+        least_m = np.where(is_seen | may_be_unseen[:, None], near_m, 0.0)[:, answered:].min(1)
+        return _Judged(np.asarray(~is_blocked.any(1)), is_allowed, least_m)
+
     def _rolled(self, asked: Floats, own: Floats, last: Floats) -> Floats:
         """Where each candidate leads from here [m], and so far ahead; shape (candidates, _STEPS + 1, 2)."""
         self._asked[: len(asked)] = asked
         self._now[:] = own, last
-        self._launch.launch()
+        (self._launch_one if len(asked) == 1 else self._launch).launch()
         return np.asarray(self._way[: len(asked)], np.float64)
 
 

@@ -24,6 +24,8 @@ from policies.companion.image_client import ImageSource
 from policies.companion.observation import CommandKernel, write_own_row
 from policies.companion.owner_goal import OwnerGoal
 from policies.companion.ranges import Ranges
+from policies.companion.senses.low_detector import LowDetector
+from policies.companion.senses.senses import Senses
 from policies.companion.skills.goal_skill import GoalSkill
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.vector_pilot import NavigationPilot
@@ -64,7 +66,7 @@ class Navigating(GoalSkill):
         self._observer = NavigationObserver(pilot.stack, drives=pilot.drives)
         self.drives = pilot.drives
         self._shown_m, self._arrived_m = pilot.shown_m, pilot.arrived_m
-        settings = guard or GuardSettings()
+        self._settings = settings = guard or GuardSettings()
         held = GoalGuard(settings, drives=pilot.drives) if settings.is_on else None
         super().__init__(pilot, self._observer, is_ordered_by_goto=is_ordered_by_goto, guard=held)
         self._command = CommandKernel()
@@ -74,11 +76,15 @@ class Navigating(GoalSkill):
         self.goals = (
             Goals(vehicle, is_ordered_by_goto=self._is_ordered_by_goto)
             if self.camera is None
-            else OwnerGoal(vehicle, self.camera)
+            else OwnerGoal(
+                vehicle, self.camera, Senses(detector=LowDetector() if self.drives else None), self._settings
+            )
         )
         self.ranges = Ranges(vehicle)
 
     def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:
+        if isinstance(self.goals, OwnerGoal):
+            self.goals.may_search = is_flying and self._settings.is_on
         if is_flying:
             self._note_arrival(own)
         goal_ned = self.goal_ned(own)

@@ -5,7 +5,7 @@ What is asked holds for every flight: nobody is touched, and an owner who is not
 
 import pytest
 
-from mission.follow.benchmark.conditions import BY_NAME
+from mission.follow.benchmark.conditions import BY_NAME, CONDITIONS
 from mission.follow.benchmark.flights import HOLD_S, Outcome, fly
 from mission.follow.benchmark.pilots import any_pilot
 from policies.companion.guard.settings import GuardSettings
@@ -24,14 +24,15 @@ def flown(name: str) -> Outcome:
     return outcome
 
 
-@pytest.mark.parametrize("name", ["late-200", "frozen", "crossed"])
+@pytest.mark.parametrize("name", [each.name for each in CONDITIONS if each.least_in_band is not None])
 def test_nobody_is_touched_and_the_owner_is_followed_to_the_end(name: str) -> None:
     outcome = flown(name)
     assert outcome.in_band > 0.5, outcome  # it follows at all; how well is the benchmark's question
 
 
-@pytest.mark.parametrize("name", ["gone-8", "gone-8-silent"])
+@pytest.mark.parametrize("name", [each.name for each in CONDITIONS if each.least_m is not None])
 def test_it_stands_soon_after_the_last_sight_of_an_owner(name: str) -> None:
     outcome = flown(name)
-    assert outcome.has_stood, f"not {HOLD_S:g} s after it: {outcome}"
+    if BY_NAME[name].numbers["owner_hide_s"] > HOLD_S:
+        assert outcome.has_stood, f"not {HOLD_S:g} s after it: {outcome}"
     assert outcome.nearest_hidden_m > 1.0, outcome

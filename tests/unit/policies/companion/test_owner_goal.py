@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 
 from common.image_stream import ImageFrame
-from policies.companion.owner_goal import KEPT_M, SILENT_S, OwnerGoal
+from policies.companion.guard.settings import GuardSettings
+from policies.companion.owner_goal import AHEAD_S, KEPT_M, SHORT_OF_M, OwnerGoal
+from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import Own, Owner
+from policies.person_detector.detector import Detection
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_CHANNELS, IMAGE_SIZE, TILT_DEG
 from policies.tasks.navigate.walking_goal import CLOSING_HZ
 
 STEP_US = 20_000
+GUARD = GuardSettings()
 BLANK = np.full((IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS)), 128, np.uint8)
 
 
@@ -31,17 +35,29 @@ class Camera:
         pass
 
 
+class Shows:
+    """A detector that sees somebody so far ahead and to the right of the vehicle; None: nobody."""
+
+    place: tuple[float, float] | None = None
+
+    def find(self, pixels, down_frd):  # noqa: ARG002
+        return [] if self.place is None else [Detection(0.99, (*self.place, 1.0), (32.0, 32.0))]
+
+
 class Scene:
     """A vehicle at home, and an owner whose phone reports without errors."""
 
     def __init__(self):
+        self.texts = []
         self.vehicle = SimpleNamespace(
             own=Own(pos_ned=(0.0, 0.0, 0.0), vel_ned=(0.0, 0.0, 0.0), boot_us=0),
             owner=Owner(),
             clock=SimpleNamespace(pictured=lambda _: None),
+            say=self.texts.append,
         )
         self.camera = Camera()
-        self.goal = OwnerGoal(self.vehicle, self.camera)
+        self.shows = Shows()
+        self.goal = OwnerGoal(self.vehicle, self.camera, Senses(detector=self.shows), GUARD)  # type: ignore[arg-type]
 
     def pass_by(self, seconds, start_ned=None, vel_ned=(0.0, 0.0, 0.0), pixels=None, late_us=0):
         """Time passes; the phone reports twice a second if it is there, and the camera shows pixels ten times."""
@@ -58,13 +74,6 @@ class Scene:
             self.goal.frame(own.boot_us)
 
 
-def shirt(column, row, depth):
-    """An image with a blue shirt."""
-    pixels = BLANK.copy()
-    pixels[row : row + 6, column : column + 4] = (30, 60, 200, depth)
-    return pixels
-
-
 def test_without_a_word_of_the_owner_there_is_no_goal_and_no_speed():
     scene = Scene()
     scene.pass_by(1.0)
@@ -78,7 +87,7 @@ def test_the_goal_is_where_the_phone_says_with_a_camera_that_shows_nobody_or_wit
     scene = Scene()
     scene.pass_by(6.0, (20.0, 5.0, -1.0), pixels=pixels)
     assert scene.goal.goal.pos_ned[:2] == pytest.approx((20.0, 5.0), abs=0.5)
-    scene.pass_by(SILENT_S + 2.0, pixels=pixels)
+    scene.pass_by(GUARD.search_s + 2.0, pixels=pixels)
     assert scene.goal.goal is None
 
 
@@ -87,7 +96,8 @@ def test_who_is_seen_is_kept_nearer_to_than_who_is_only_heard_of():
     heard, seen = Scene(), Scene()
     place = (6.0, 0.0, -1.0)
     heard.pass_by(10.0, place)
-    seen.pass_by(10.0, place, pixels=shirt(30, 20, 100))
+    seen.shows.place = place[:2]
+    seen.pass_by(10.0, place, pixels=BLANK)
     limits = []
     for scene in (heard, seen):
         north = scene.goal.goal.pos_ned[0]
@@ -122,3 +132,52 @@ def test_old_images_do_not_make_it_forget_what_the_phone_says(late_us):
         scene.pass_by(0.1, (20.0, 5.0, -1.0), pixels=BLANK, late_us=late_us)
         assert scene.goal.goal is not None
     assert scene.goal.goal.pos_ned[:2] == pytest.approx((20.0, 5.0), abs=0.7)
+
+
+def walking(seconds=3.0, speed=1.0):
+    """A scene whose camera has seen somebody go north from 5 m ahead, and whose phone has said nothing."""
+    scene = Scene()
+    scene.goal.may_search = True
+    for step in range(round(10 * seconds)):
+        scene.shows.place = (5.0 + 0.1 * step * speed, 0.0)
+        scene.pass_by(0.1, pixels=BLANK)
+    return scene
+
+
+def test_who_is_neither_seen_nor_heard_of_is_waited_for_and_then_looked_for_where_they_went():
+    scene = walking()
+    last_m = scene.shows.place[0]
+    assert scene.goal.speed_max_m_s > 1.0
+    scene.shows.place = None
+    scene.pass_by(GUARD.stop_s + 0.2, pixels=BLANK)
+    assert scene.goal.goal is not None
+    assert scene.goal.speed_max_m_s == 0.0
+    scene.pass_by(GUARD.search_s - GUARD.stop_s, pixels=BLANK)
+    assert scene.texts == ["Companion: searching the owner"]
+    north, east = scene.goal.goal.pos_ned[:2]
+    assert (north, east) == pytest.approx((last_m + AHEAD_S, 0.0), abs=1.0)
+    assert 0.5 < scene.goal.speed_max_m_s <= GUARD.search_ahead_speed
+    scene.vehicle.own.pos_ned = (north - SHORT_OF_M, east, 0.0)
+    assert scene.goal.speed_max_m_s == 0.0
+
+
+def test_who_is_found_again_is_followed_and_who_is_not_is_lost_in_the_end():
+    scene = walking()
+    scene.shows.place = None
+    scene.pass_by(GUARD.search_s + 1.0, pixels=BLANK)
+    scene.shows.place = (9.0, 1.0)
+    scene.pass_by(1.0, pixels=BLANK)
+    assert scene.texts == ["Companion: searching the owner", "Companion: following"]
+    assert scene.goal.goal.pos_ned[:2] == pytest.approx((9.0, 1.0), abs=0.5)
+    scene.shows.place = None
+    scene.pass_by(GUARD.lost_s - 0.5, pixels=BLANK)
+    assert scene.goal.goal is not None
+    scene.pass_by(1.0, pixels=BLANK)
+    assert scene.goal.goal is None
+
+
+def test_who_is_lost_before_it_drives_is_lost_at_once():
+    scene = walking()
+    scene.goal.may_search, scene.shows.place = False, None
+    scene.pass_by(GUARD.search_s + 0.2, pixels=BLANK)
+    assert scene.goal.goal is None
