@@ -73,10 +73,10 @@ class Training:
 TRAININGS = {
     "navigate": Training(
         "Navigate",
-        ("navigate", "navigate-careful", "navigate-late"),
+        ("navigate", "navigate-careful"),
         NAVIGATE_LONGEST,
         mean_speed,
-        episodes=250,
+        episodes=1000,
         numbers={"trees_per_ha": 600.0},
     ),
     "drive-park": Training(
