@@ -49,13 +49,15 @@ reproduce-cars: $(STAMP) ## Train every row of docs/results/cars.md from scratch
 reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow.md (hours); flags: ARGS="student"
 	@$(BIN)/python -m bench.follow $(ARGS)
 
-reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in three legs of three seeds, choose and judge it (two hours); without training: ARGS="judge"
+reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in two legs of three seeds, choose and judge it (two hours); without training: ARGS="judge"
 	@$(BIN)/python -m bench.training_seeds navigate $(ARGS)
 	@$(BIN)/python -m bench.navigate results/navigate-chosen.pt
 
-reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policy from nothing, and judge it (a quarter of an hour)
-	@$(BIN)/honeyguide train navigate-rover --run-id navigate-rover --force
-	@$(BIN)/python -m bench.navigate_rover results/navigate-rover/NavigateRover.pt
+reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policies from nothing, three seeds of each, choose and judge them (an hour); without training: ARGS="judge"
+	@$(BIN)/python -m bench.training_seeds navigate-rover $(ARGS)
+	@$(BIN)/python -m bench.training_seeds navigate-rover-follow $(ARGS)
+	@$(BIN)/python -m bench.navigate_rover results/navigate-rover-chosen.pt
+	@$(BIN)/python -m bench.follow_rover results/navigate-rover-follow-chosen.pt
 
 reproduce-offline: $(STAMP) ## Log flights, learn from their logs alone, forecast, then fly: to follow, park and navigate; one: ARGS="--story park"
 	@$(BIN)/python -m bench.offline_story $(ARGS)

@@ -1,6 +1,6 @@
 """`python -m bench.training_seeds NAME [judge] [test] [POLICY …]`: three seeds of a policy, and which of them is best.
 
-In: `navigate`, `drive-park` or `drive-reach`, and the recipes of its legs. Out: results/NAME-seed-N with a run of each
+In: `navigate`, `drive-park` or another of `TRAININGS`, and the recipes of its legs. Out: results/NAME-seed-N with a run of each
 leg, one on each core, and what it said in a log beside it; a table of how the last ones do in validation worlds, their
 scans 0 to 0.2 s late, and the best as results/NAME-chosen.pt. With `judge`, or policy files, it judges only; with
 `seed=N LEG` it trains that leg alone. What is chosen by is neither trained on nor of the tests; with `test` the worlds
@@ -73,11 +73,27 @@ class Training:
 TRAININGS = {
     "navigate": Training(
         "Navigate",
-        ("navigate", "navigate-careful", "navigate-late"),
+        ("navigate", "navigate-careful"),
         NAVIGATE_LONGEST,
         mean_speed,
-        episodes=250,
+        episodes=1000,
         numbers={"trees_per_ha": 600.0},
+    ),
+    "navigate-rover": Training(
+        "NavigateRover",
+        ("navigate-rover",),
+        NAVIGATE_LONGEST,
+        mean_speed,
+        episodes=1000,
+        numbers={"trees_per_ha": 600.0},
+    ),
+    "navigate-rover-follow": Training(
+        "NavigateRover",
+        ("navigate-rover-follow",),
+        NAVIGATE_LONGEST,
+        mean_speed,
+        episodes=1000,
+        numbers={"trees_per_ha": 400.0, "kept_m": 3.0},
     ),
     "drive-park": Training(
         "Drive", ("drive-park", "drive-park-careful"), DRIVE_LONGEST, touched_and_time, episodes=1000
