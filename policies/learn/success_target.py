@@ -1,8 +1,8 @@
 """How good a policy in training is: it is judged on episodes of its own that it never trained on.
 
-In: the policy, and the training's last episodes. Out: an evaluation, when one is worth its time: by it a training may end
-early, and the best policy is kept. It is played on the
-run's own split of the positions: to choose the policy by its success on test positions would be to train on them.
+In: the policy, and the training's last episodes. Out: an evaluation, when one is worth its time: by it a training may
+end early, and the best policy is kept. It is played on the run's own split of the positions: to choose the policy by
+its success on test positions would be to train on them.
 """
 
 from dataclasses import dataclass
