@@ -1,12 +1,13 @@
 """`python -m bench.training_seeds NAME [judge] [test] [POLICY …]`: three seeds of a policy, and which of them is best.
 
-In: `navigate`, `drive-park` or another of `TRAININGS`, and the recipes of its legs. Out: results/NAME-seed-N with a run of each
+In: a name of `TRAININGS`, such as `navigate`, and the recipes of its legs. Out: results/NAME-seed-N with a run of each
 leg, one on each core, and what it said in a log beside it; a table of how the last ones do in validation worlds, their
 scans 0 to 0.2 s late, and the best as results/NAME-chosen.pt. With `judge`, or policy files, it judges only; with
 `seed=N LEG` it trains that leg alone. What is chosen by is neither trained on nor of the tests; with `test` the worlds
 are those of the tests, and nothing is chosen. The card of the best says how it did without lag.
 """
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -25,8 +26,6 @@ from bench.navigate import LONGEST as NAVIGATE_LONGEST
 from bench.navigate import arrival_speeds
 from bench.side_by_side import Job, run_side_by_side
 from common.intervals import Interval, rate
-from policies.learn.config.load import load_config
-from policies.learn.config.recipes import recipe
 from policies.learn.export.policy_file import load_policy
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.drive.drive import Drive
@@ -147,10 +146,10 @@ def train(name: str, seed: int, leg: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)  # a recipe names the policy that it goes on from as it lies beside it
     command = [sys.executable, "-c", "from mission.cli import main; main()"]
     subprocess.run([*command, "train", leg, "--run-id", leg, "--seed", str(seed), "--force"], cwd=folder, check=True)
-    path, wanted = policy_of(name, seed, leg), load_config(recipe(leg)).config.behavior.max_steps
-    if (steps := load_policy(path)[1].steps) < wanted:
+    path = policy_of(name, seed, leg)
+    if json.loads((path.parent / "run_logs" / "training_status.json").read_text())["end"] == "stopped":
         path.unlink()
-        raise SystemExit(f"training_seeds: {path} was stopped after {steps:,} of {wanted:,} steps")
+        raise SystemExit(f"training_seeds: {path}: training was stopped before its end")
 
 
 def policy_of(name: str, seed: int, leg: str) -> Path:

@@ -257,7 +257,7 @@ def _summary(result: Result) -> str:
     if progress.mean_reward is not None:
         success = f"success {100.0 * progress.success_rate:.1f} %, " if progress.success_rate is not None else ""
         lines.append(f"training: {success}reward {progress.mean_reward:.3f}")
-    if result.judged is not None:
+    if result.judged is not None and result.judged.says_success:
         lines.append(f"judged: success {_rate(result.judged)} of {result.judged.episodes} episodes it did not train on")
     return "\n".join([*lines, f"policy: {result.policy}, {result.network}"])
 

@@ -42,6 +42,11 @@ class Evaluation:
         return self.outcomes["success"] / self.episodes
 
     @property
+    def worth(self) -> float:
+        """What policies are compared by: the success rate, or the mean return of a task that says of none."""
+        return self.success_rate if self.says_success else self.mean_return
+
+    @property
     def interval(self) -> tuple[float, float]:
         """Of the success rate, 95 %."""
         return wilson_interval(self.outcomes["success"], self.episodes)

@@ -1,7 +1,8 @@
-"""When a training may stop early: the policy is judged on episodes of its own that it never trained on.
+"""How good a policy in training is: it is judged on episodes of its own that it never trained on.
 
-In: the policy, and the training's last episodes. Out: an evaluation, when one is worth its time. It is played on the
-run's own split of the positions: to choose the policy by its success on test positions would be to train on them.
+In: the policy, and the training's last episodes. Out: an evaluation, when one is worth its time: by it a training may
+end early, and the best policy is kept. It is played on the run's own split of the positions: to choose the policy by
+its success on test positions would be to train on them.
 """
 
 from dataclasses import dataclass
@@ -17,7 +18,8 @@ from policies.tasks.task import TaskSettings
 class SuccessTarget:
     """The fraction of episodes that is to succeed, and on what."""
 
-    fraction: float
+    fraction: float | None
+    """None: whatever; it is judged for the sake of the best, and training goes on."""
     task_name: str
     settings: TaskSettings
     episode_count: int = 2000
@@ -43,10 +45,12 @@ class SuccessTarget:
 
     def is_reached(self, evaluation: Evaluation) -> bool:
         """Whether the success rate is above the target with 97.5 % confidence."""
-        return evaluation.interval[0] >= self.fraction
+        return self.fraction is not None and evaluation.interval[0] >= self.fraction
 
     def _is_promising(self, recent: RecentEpisodes) -> bool:
         """Whether enough training episodes succeed, drawn actions and all, to make an evaluation worth its time."""
+        if self.fraction is None:
+            return True
         scores = recent.scores
         rate = scores.count(Outcome.SUCCESS) / max(scores.episode_count, 1)
         return scores.episode_count >= recent.least and rate >= 1.0 - 5.0 * (1.0 - self.fraction)

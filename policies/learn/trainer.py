@@ -20,6 +20,7 @@ from policies.learn.best_policy import BestPolicy
 from policies.learn.build_learner import build_learner, remarks
 from policies.learn.checkpoint_compatibility import flat, require_fit, settings_that_must_fit
 from policies.learn.config.network import NetworkSettings
+from policies.learn.config.offline import OfflineHyperparameters
 from policies.learn.config.run import RunConfig
 from policies.learn.curriculum import Curriculum, RecentEpisodes
 from policies.learn.evaluate import Evaluation
@@ -155,7 +156,9 @@ class Training:
         self._parents: list[dict[str, Any]] = []
         self._teacher, self._data = teacher_record(self.behavior), data_records(self.behavior)
         fraction = self.behavior.success_target
-        self._target = SuccessTarget(fraction, self.task_name, self.task_settings) if fraction is not None else None
+        is_offline = isinstance(self.behavior.hyperparameters, OfflineHyperparameters)
+        is_judged = fraction is not None or (self.behavior.keep_best and not is_offline)
+        self._target = SuccessTarget(fraction, self.task_name, self.task_settings) if is_judged else None
         self._judged: Evaluation | None = None
         self._best = BestPolicy()
         self._moments: deque[tuple[float, int]] = deque(maxlen=_RATE_ITERATIONS + 1)
@@ -229,7 +232,7 @@ class Training:
                 values["Environment/Judged Success Rate"] = self._judged.success_rate
                 is_reached = self._target.is_reached(self._judged)
                 if self.behavior.keep_best:
-                    self._best.offer(self.learner.policy, self._card(), self._judged, self._judged.success_rate)
+                    self._best.offer(self.learner.policy, self._card(), self._judged, self._judged.worth)
         self._events.write(self.learner.steps, values)
         return is_reached
 
@@ -303,7 +306,7 @@ class Training:
             low, high = wilson_interval(progress.scores.count(Outcome.SUCCESS), count)
             figures |= {"training_success_rate": progress.success_rate, "training_episodes": count}
             figures |= {"training_success_low": low, "training_success_high": high}
-        if self._judged is not None:
+        if self._judged is not None and self._judged.says_success:
             low, high = self._judged.interval
             figures |= {"success_rate": self._judged.success_rate, "success_low": low, "success_high": high}
             figures["episodes"] = self._judged.episodes

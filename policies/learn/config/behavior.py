@@ -239,8 +239,9 @@ class Behavior(Block):
     success_target: FractionOrNone = own_key(None)
     """Training ends when this fraction of episodes succeeds; none: at max_steps only."""
     keep_best: bool = own_key(False)
-    """Whether the trained policy is the one that did best when it was held against success_target, or, where a
-    dataset is learnt from without a target, the one that returned most in an evaluation; not the last."""
+    """Whether the trained policy is the one that did best when it was judged, not the last: at each summary in the last
+    lesson, where a success_target is set once that comes near, or, where a dataset is learnt from without one, in its
+    evaluations. Success counts, or the mean return of a task that says of none."""
 
     @field_validator("self_play", mode="before")
     @classmethod
@@ -260,10 +261,9 @@ class Behavior(Block):
 
     @model_validator(mode="after")
     def _best_is_reported(self) -> Self:
-        if not self.keep_best or self.success_target is not None:
+        is_offline = isinstance(self.hyperparameters, OfflineHyperparameters)
+        if not self.keep_best or self.success_target is not None or not is_offline:
             return self
-        if not isinstance(self.hyperparameters, OfflineHyperparameters):
-            raise ValueError("keep_best: takes a success_target, against which policies are held")
         if self.offline is not None and not self.offline.evaluation_episodes:
             raise ValueError(
                 "keep_best: takes evaluations or a success_target, and evaluation_episodes of offline are 0"

@@ -1,5 +1,6 @@
 """How the policy that ships is chosen among those of several seeds."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -36,18 +37,25 @@ def test_a_leg_begins_when_the_one_before_it_has_ended_and_not_by_what_an_earlie
     assert not jobs[f"{name}-seed-1-{second}"].is_ready()
 
 
-def test_a_leg_that_was_stopped_leaves_no_policy_to_go_on_from(tmp_path, monkeypatch):
+def test_a_leg_that_was_stopped_and_no_other_leaves_no_policy_to_go_on_from(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = policy_of("drive-reach", 1, "drive-reach")
 
-    def stopped(*_: object, **__: object) -> None:
-        path.parent.mkdir(parents=True)
+    def ended(*_: object, **__: object) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(find_policy("reach-target").read_bytes())
+        status = path.parent / "run_logs" / "training_status.json"
+        status.parent.mkdir(exist_ok=True)
+        status.write_text(json.dumps({"end": end}))
 
-    monkeypatch.setattr("bench.training_seeds.subprocess.run", stopped)
-    with pytest.raises(SystemExit, match="was stopped after"):
+    end = "stopped"
+    monkeypatch.setattr("bench.training_seeds.subprocess.run", ended)
+    with pytest.raises(SystemExit, match="was stopped before its end"):
         train("drive-reach", 1, "drive-reach")
     assert not path.exists()
+    end = "max_steps"
+    train("drive-reach", 1, "drive-reach")  # also where the best policy is an earlier one
+    assert path.exists()
 
 
 def test_failed_legs_are_named_and_nothing_is_chosen(tmp_path, monkeypatch, capsys):
@@ -70,6 +78,6 @@ def test_a_policy_is_as_good_as_its_intervals_begin_on_average():
 
 def test_a_policy_that_is_not_known_is_refused(capsys):
     assert main(["hover"]) == 2
-    assert "name one of navigate, drive-park, drive-reach" in capsys.readouterr().out
+    assert f"name one of {', '.join(TRAININGS)}" in capsys.readouterr().out
     assert main(["drive-park", "seed=1", "hover"]) == 2
     assert "name one of drive-park, drive-park-careful" in capsys.readouterr().out

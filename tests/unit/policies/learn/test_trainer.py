@@ -4,7 +4,6 @@ import json
 
 import pytest
 import torch
-from pydantic import ValidationError
 
 from policies.learn.checkpoint import checkpoints, load, save
 from policies.learn.config.run import RunConfig
@@ -278,6 +277,10 @@ def test_the_policy_that_was_judged_best_is_what_training_ends_with(tmp_path):
     torch.testing.assert_close(again.state_dict(), policy.state_dict(), rtol=0.0, atol=0.0)
 
 
-def test_the_best_policy_is_not_kept_where_none_is_judged(tmp_path):
-    with pytest.raises(ValidationError, match="keep_best: takes a success_target"):
-        config(tmp_path, KINDS["ppo"] | {"keep_best": True})
+def test_without_a_target_the_best_is_kept_too_and_training_goes_on_to_its_end(tmp_path):
+    best = KINDS["ppo"] | {"keep_best": True, "summary_freq": 1_000, "max_steps": 3_000}
+    training = Training(config(tmp_path, best), StopAfter(100))
+    result = training.run()
+    assert result.end == "max_steps"
+    assert result.judged is not None
+    assert load_policy(result.policy)[1].figures["episodes"] == result.judged.episodes
