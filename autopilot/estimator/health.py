@@ -159,6 +159,23 @@ def with_deviations(cov: wp.array2d(dtype=vec24), i: int, estimate: Estimate) ->
 
 
 @wp.func
+def carried_s(params: EstimatorParams, wheels_s: float, external_vel_s: float) -> float:
+    """For how long [s] a position stays valid after the last one that was fused: longer while the way is measured.
+
+    Args:
+        params: of the estimator.
+        wheels_s: since the speed of wheels was fused last.
+        external_vel_s: since a velocity from outside was.
+    """
+    valid_s = params.no_aid_s
+    if wheels_s < params.no_aid_s:
+        valid_s = wp.max(valid_s, params.wheel_valid_s)
+    if external_vel_s < params.no_aid_s:
+        valid_s = wp.max(valid_s, params.external_vel_valid_s)
+    return valid_s
+
+
+@wp.func
 def flags(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, state: EstimatorState) -> int:
     """Bits of `Estimate.flags`."""
     bits = int(0)
@@ -175,12 +192,10 @@ def flags(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, state: 
             bits = bits | EXTERNAL_POSITION
         pos_s = wp.min(pos_s, external_pos_s)
         vel_s = wp.min(pos_s, seconds_since(now_us, state.gnss_vel.fused_time_us))
-        vel_s = wp.min(vel_s, seconds_since(now_us, state.external_vel.fused_time_us))
+        external_vel_s = seconds_since(now_us, state.external_vel.fused_time_us)
+        vel_s = wp.min(vel_s, external_vel_s)
         wheels_s = seconds_since(now_us, state.wheels.fused_time_us)
-        valid_s = params.no_aid_s
-        if wheels_s < params.no_aid_s:
-            valid_s = wp.max(valid_s, params.wheel_valid_s)
-        if pos_s < valid_s and cov[i, POS][POS] < _MAX_POS_VAR:
+        if pos_s < carried_s(params, wheels_s, external_vel_s) and cov[i, POS][POS] < _MAX_POS_VAR:
             bits = bits | POSITION_VALID
         if wp.min(vel_s, wheels_s) < params.no_aid_s:
             bits = bits | VELOCITY_VALID

@@ -119,6 +119,7 @@ class EstimatorParams:
     wheel_x: float
     wheel_track: float
     wheel_valid_s: float
+    external_vel_valid_s: float
 
 
 _BMI088 = "BMI088 data sheet and vibration of a 10-inch quadcopter (guess)"
@@ -339,6 +340,16 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
         "EKF2_EVP_GATE", 5.0, 1.0, 50.0, "SD", "gate of position and heading from outside", _PX4, "external_pos_gate"
     ),
     Parameter("EKF2_EVV_GATE", 3.0, 1.0, 50.0, "SD", "gate of velocity from outside", _PX4, "external_vel_gate"),
+    Parameter(
+        "EKF2_EVV_TOUT",
+        120.0,
+        0.0,
+        3600.0,
+        "s",
+        "dead reckoning on velocity from outside until position is invalid",
+        "guess: 5 % of 120 s at 2 m/s are 12 m; PX4 has no such bound",
+        "external_vel_valid_s",
+    ),
     Parameter("EKF2_WIND_NSD", 0.1, 0.0, 1.0, "m/s/sqrt(s)", "random walk of the wind", "guess: gusts", "wind_walk"),
 ]
 

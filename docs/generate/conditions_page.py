@@ -49,6 +49,8 @@ def _differences(condition: Condition) -> str:
         parts.append(f"wind of {condition.wind_m_s:g} m/s")
     if condition.airframe != AIRFRAME:
         parts.append(f"airframe `{condition.airframe}`")
+    if condition.gnss_away_s is not None:
+        parts.append("no GNSS from {:g} to {:g} s".format(*condition.gnss_away_s))
     return ", ".join(parts) or "-"
 
 

@@ -7,6 +7,9 @@ from mission.flight_options import flight_config
 from mission.flight_settings import FollowOptions, Pace
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
+BY_SIGHT = {"EKF2_EV_CTRL": 4.0}
+"""The parameter by which our flight controller uses the velocity that the companion sees while GNSS is away."""
+
 
 def follow_config(options: FollowOptions, *, has_scanner: bool = False) -> FlightConfig:
     """The flight that the options describe: the world of training, with their seed, trees and hills.
@@ -19,4 +22,7 @@ def follow_config(options: FollowOptions, *, has_scanner: bool = False) -> Fligh
     own = {"seed": options.world_seed, "trees_per_ha": options.trees_per_ha, "hill_height_m": options.hill_height_m}
     world = FOLLOW_WORLD.model_copy(update=own)
     owner = OwnerConfig(pace=cast(Pace, options.owner))
-    return config.model_copy(update={"world": world, "owner": owner, "is_forest": has_scanner})
+    parameters = BY_SIGHT | config.parameters if options.board == "own" else config.parameters
+    return config.model_copy(
+        update={"world": world, "owner": owner, "is_forest": has_scanner, "parameters": parameters}
+    )

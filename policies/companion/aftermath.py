@@ -54,6 +54,7 @@ class Condition:
     is_well: bool = True  # whatever was healthy when the policy took over is, and the battery is not low
     is_lost: bool = False  # who is followed was not found again: the end
     is_alone: bool = False  # who is followed is not seen
+    is_by_sight: bool = False  # GNSS is away: nobody is sent home by what was flown since
     is_covered: bool = False  # something was seen over the vehicle
     height_m: float = nan  # above the ground; NaN: not known
     pos_ned: Vector = (nan, nan, nan)  # [m]
@@ -165,7 +166,7 @@ class Aftermath:
             self._begin(Right.FALLEN, time_us, now)
         elif now.mode is not self._mode or self._is_moved(time_us, now):
             self.end()
-        elif not now.is_alone:
+        elif not now.is_alone or now.is_by_sight:
             self._alone_us = time_us
 
     def _is_moved(self, time_us: int, now: Condition) -> bool:

@@ -208,6 +208,7 @@ class Companion:
             is_well=has_attitude and self._is_well(own),
             is_lost=is_lost,
             is_alone=skill.is_alone(own),
+            is_by_sight=skill.is_by_sight,
             is_covered=self._sending is not Sending.POLICY and skill.is_covered(own),
             height_m=own.range_m if time_us - own.range_us <= TELEMETRY_OLD_US else nan,
             pos_ned=own.pos_ned,

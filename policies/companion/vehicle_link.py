@@ -22,6 +22,7 @@ from autopilot.vehicles.rover.vehicle import ROVER
 from common.attitude import Quat, Vector
 from common.geodesy import GeoPoint, ned_from_geodetic
 from policies.companion.engagement import Wish
+from policies.companion.odometry.steady_frame import SteadyFrame
 from policies.companion.vehicle_clock import VehicleClock
 
 Listener = Callable[[int, int, Any, int], None]
@@ -121,6 +122,8 @@ class VehicleLink:
         self.is_by_sticks = is_by_sticks
         self.own = Own()
         self.clock = VehicleClock()
+        self.frame = SteadyFrame()
+        """In which places are kept; the vehicle's own unless somebody watches its corrections."""
         self.owner = Owner()
         self.system_id = system_id
         self._client = ClientEnd(link, system_id, COMPONENT, vehicle_id=system_id)
@@ -255,7 +258,9 @@ class VehicleLink:
         elif name == "LOCAL_POSITION_NED":
             pos_ned, vel_ned = (fields.x, fields.y, fields.z), (fields.vx, fields.vy, fields.vz)
             if is_known(POSITION_MAX_M, *pos_ned) and is_known(SPEED_MAX_M_S, *vel_ned):
-                own.pos_ned, own.vel_ned, own.position_us = pos_ned, vel_ned, time_us
+                boot_us = self.clock.time_us(fields.time_boot_ms)
+                own.pos_ned, own.vel_ned = self.frame.steady(boot_us, pos_ned, vel_ned), vel_ned
+                own.position_us = time_us
         elif name == "DISTANCE_SENSOR":
             self._distance_reported(fields, time_us)
         elif name == "HEARTBEAT":
@@ -328,7 +333,7 @@ class VehicleLink:
         if not is_known(POSITION_MAX_M, *pos_ned) or not is_known(SPEED_MAX_M_S, north, east, down):
             return
         owner, var = self.owner, fields.position_cov[0]
-        owner.pos_ned, owner.vel_ned, owner.has_velocity = pos_ned, (north, east, down), has_velocity
+        owner.pos_ned, owner.vel_ned, owner.has_velocity = self.frame.of(pos_ned), (north, east, down), has_velocity
         owner.std_m = var**0.5 if 0.0 < var <= POSITION_MAX_M else nan
         owner.arrived_us = time_us
         owner.count += 1

@@ -38,6 +38,8 @@ class Condition:
     """None: by the seed."""
     airframe: str = AIRFRAME
     sensor_roughness: float = 0.0
+    gnss_away_s: tuple[float, float] | None = None
+    """From when to when of the following no satellite is received; None: never."""
 
 
 CONDITIONS = (
@@ -83,6 +85,7 @@ CONDITIONS = (
     Condition("blur", "pictures blurred by 33 ms", "walk", {"shutter_s": 0.033}, 0.9),
     Condition("wind", "wind of 10 m/s", "walk", {}, 0.9, wind_m_s=10.0),
     Condition("rough", "sensors as in the roughest real log", "walk", {}, 0.95, sensor_roughness=1.0),
+    Condition("no-gnss", "no GNSS for 25 s", "walk", {}, 0.95, gnss_away_s=(10.0, 35.0)),
     Condition("f450", "airframe F450, smaller", "walk", {}, 0.95, airframe="f450"),
     Condition("f550", "airframe F550, of six motors", "walk", {}, 0.95, airframe="f550"),
 )

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.interface.failure_requests import Failure, Unit
 from mission.benchmark.benchmark import changed_per_min
 from mission.benchmark.kept_flight import KeptFlight
 from mission.flight_config import FlightConfig, OwnerConfig
 from mission.follow.benchmark.conditions import Condition
+from mission.follow.follow_options import BY_SIGHT
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.lockstep import flight_with_companion, follow_for
 from policies.companion.guard.settings import GuardSettings
@@ -30,6 +32,7 @@ STANDS_M_S = 0.5
 HOLD_S = 5.0  # after the last sight, until it must stand
 BACK_S = 10.0  # after they are back, until it must follow
 _SUSTAINED_S = 1.0
+_AWAY_AND_BACK = (Failure.OFF, Failure.OK)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +68,7 @@ def flight_of(condition: Condition, seed: int) -> FlightConfig:
         wind_m_s=wind_m_s,
         airframe=condition.airframe,
         sensor_roughness=condition.sensor_roughness,
+        parameters=dict(BY_SIGHT),
     )
 
 
@@ -83,9 +87,12 @@ def fly(
     kept.begin(flight, companion)
     is_hidden: list[bool] = []
     has_touched = False
+    switches = [] if condition.gnss_away_s is None else list(zip(condition.gnss_away_s, _AWAY_AND_BACK, strict=True))
 
     def look(watch: FollowWatch) -> None:
         nonlocal has_touched
+        while switches and watch.judged_s + watch.paused_s >= switches[0][0]:
+            flight.injector.inject(Unit.GNSS, switches.pop(0)[1], 0)
         if watch.sample_count > len(is_hidden):
             truth = flight.rig.rows["truth"][0]
             has_touched = bool(truth["impact_speed"] > 0.0 or truth["is_on_ground"] or truth["is_crashed"])

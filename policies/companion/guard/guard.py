@@ -17,6 +17,7 @@ from policies.companion.guard.interventions import (
     NEAR_SOMEBODY,
     NEAR_SOMETHING,
     NO_DEPTH,
+    NO_GNSS,
     OVER_OWNER,
     OVER_SOMEBODY,
     TILTED,
@@ -75,6 +76,8 @@ class Guard:
         self.goes_on_from = np.zeros(2)
         """The level velocity [m/s] from which a pilot goes on who changes it by steps: as flown, with some of what
         things took off it. From what was flown alone, steps towards a trunk and turns off it come to a stand there."""
+        self.vel_std: float | None = None
+        """[m/s] How well the velocity is known while GNSS is away; None: it is there."""
         self._is_too_near = False
         self._sinking_max = 0.0  # [m/s] of who is too near
         self._risen_us = NEVER_US  # when it rose over the owner last
@@ -91,7 +94,8 @@ class Guard:
 
     def is_lost(self, own: Own) -> bool:
         """Whether the owner was not seen for so long that it is the end; who has just begun may look for them first."""
-        return self._alone_s(own) > self.settings.lost_s
+        s = self.settings
+        return self._alone_s(own) > (s.lost_s if self.vel_std is None else min(s.lost_s, s.sight_lost_s))
 
     def _alone_s(self, own: Own) -> float:
         """Since the owner was seen, or since the policy took over."""
@@ -119,12 +123,22 @@ class Guard:
         if self.stance is Stance.FREE and is_tilted(own.q_ned_from_frd, s):
             level = np.array(own.vel_ned[:2])  # asks for no more tilt
             self.interventions.note(TILTED)
-        let_be, people = self._past_people(level, own)
+        let_be, people = self._past_people(self._by_sight(level), own)
         level = self._flown = self._past_solids(let_be, own, people)
         taken = let_be - level
         self.goes_on_from = level + taken * min(1.0, _KEPT_M_S / max(float(np.hypot(*taken)), 1e-6))
         down = self._within_heights(down, own)
         return (float(level[0]), float(level[1]), float(down)), yaw_rate
+
+    def _by_sight(self, level: Floats) -> Floats:
+        """The velocity, as fast as who has no GNSS may go: as well as it knows how fast it goes."""
+        if self.vel_std is None:
+            return level
+        s = self.settings
+        most = s.sight_speed * faded(self.vel_std, s.sight_slow_std, s.sight_stop_std)
+        slower = level * min(1.0, most / max(float(np.hypot(*level)), 1e-6))
+        self._count(NO_GNSS, level, slower)
+        return slower
 
     def _stance(self, silence_s: float, age_s: float) -> Stance:
         s = self.settings
@@ -154,6 +168,10 @@ class Guard:
         height_m = s.search_among_height_m if among else s.search_height_m
         down = -CLIMB_M_S * float(np.clip(2.0 * (height_m - own.range_m), -0.5, 1.0))
         down = down if isfinite(own.range_m) else 0.0
+        if self.vel_std is not None:  # nobody searches where it does not know how far it has come
+            has_known = self.senses.seen.sights > 0 and not is_searching
+            turns = self._facing(self.senses.seen.now(own.boot_us)[0], own) if has_known else s.search_yaw_rate
+            return self._staying(own), down, turns
         track = self.senses.watch.track
         if self.senses.is_heard and track is not None and track.is_known:
             way = np.array(track.pos_ned[:2]) - np.array(own.pos_ned[:2])

@@ -28,6 +28,7 @@ _RISING = (
     ("height_min_m", "height_max_m"),
     ("scan_slow_s", "scan_stop_s"),
     ("dark_slow_s", "dark_stop_s"),
+    ("sight_slow_std", "sight_stop_std"),
 )
 """The second of each is above the first."""
 
@@ -66,6 +67,15 @@ class GuardSettings(BaseModel):
     """... and after so long in it, the owner still not seen, it asks for Return; 0: stays in Hold."""
     resume_s: float = Field(default=30.0, ge=0.0, le=LONG_S)
     """So long after the position was lost it may follow again by itself, if it is still in the air; 0: never."""
+    sight_lost_s: float = Field(default=20.0, gt=0.0, le=LONG_S)
+    """As `lost_s`, while GNSS is away: it does not search then, it stays and turns."""
+    sight_speed: float = Field(default=4.0, gt=0.0, le=20.0)
+    """[m/s] while GNSS is away: what is seen of the ground is near, and pictures are a tenth of a second apart."""
+    sight_slow_std: float = Field(default=0.4, gt=0.0, le=20.0)
+    """[m/s] From this deviation of the velocity on that odometry tells it becomes slower; without it 0.1 m/s more each
+    second ..."""
+    sight_stop_std: float = Field(default=0.8, gt=0.0, le=20.0)
+    """... until it stands."""
     search_speed: float = Field(default=4.0, gt=0.0, le=20.0)
     """[m/s] towards the phone."""
     search_stand_off_m: float = Field(default=5.0, gt=0.0, le=20.0)

@@ -2,7 +2,8 @@
 
 from collections import deque
 from dataclasses import dataclass
-from math import isfinite
+from itertools import islice
+from math import hypot, isfinite
 
 from common.attitude import Quat, Vector
 from policies.companion.vehicle_link import Own
@@ -35,3 +36,20 @@ class PoseHistory:
     def at(self, time_us: int) -> Pose | None:
         """The pose nearest in time; None before the first."""
         return min(self._poses, key=lambda pose: abs(pose.time_us - time_us)) if self._poses else None
+
+    def between(self, time_us: int) -> Pose | None:
+        """The pose at a time, between those before and after it; None: one of them has not come, or is too old."""
+        for later, earlier in zip(reversed(self._poses), islice(reversed(self._poses), 1, None), strict=False):
+            if earlier.time_us <= time_us <= later.time_us:
+                return _between(earlier, later, (time_us - earlier.time_us) / (later.time_us - earlier.time_us))
+        return None
+
+
+def _between(first: Pose, second: Pose, part: float) -> Pose:
+    """Some part of the way from one pose to the next, which turn by little: a straight line will do."""
+    rest = 1.0 - part
+    pos = [rest * a + part * b for a, b in zip(first.pos_ned, second.pos_ned, strict=True)]
+    sign = 1.0 if sum(a * b for a, b in zip(first.q_ned_from_frd, second.q_ned_from_frd, strict=True)) >= 0.0 else -1.0
+    q = [rest * a + sign * part * b for a, b in zip(first.q_ned_from_frd, second.q_ned_from_frd, strict=True)]
+    x, y, z, w = (each / hypot(*q) for each in q)
+    return Pose(round(rest * first.time_us + part * second.time_us), (pos[0], pos[1], pos[2]), (x, y, z, w))

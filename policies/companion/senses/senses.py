@@ -64,7 +64,8 @@ class Senses:
     def _forget(self) -> None:
         """The vehicle's clock and frame begin anew."""
         self._boot_us = 0
-        self._poses = PoseHistory()
+        self.poses = PoseHistory()
+        """Where the vehicle was in the last seconds."""
         self.map = LocalMap()
         self._is_up = True  # until a range says otherwise
         self.seen = SeenOwner()
@@ -86,13 +87,13 @@ class Senses:
         if own.boot_us < self._boot_us:  # it has restarted: what was seen before was at no time that it knows
             self._forget()
         self._boot_us = own.boot_us
-        self._poses.note(own)
+        self.poses.note(own)
         if owner.count != self._reports:
             self._reports, self.heard_us = owner.count, own.boot_us
             self._check(own, owner)
         if image is None or not isfinite(own.pos_ned[0]):
             return
-        pose = self._poses.at(image.time_us)
+        pose = self.poses.at(image.time_us)
         if pose is None:
             return
         self.image_us = image.time_us

@@ -18,6 +18,7 @@ from policies.companion.guard.interventions import BeginningReasons, Interventio
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
 from policies.companion.observation import Observer, image_layout
+from policies.companion.odometry.by_sight import BySight
 from policies.companion.owner_watch import OwnerWatch
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Floats, Velocity
@@ -88,6 +89,7 @@ class Following:
         self.guard = (
             Guard(guard, self._senses) if guard is not None and is_guarded and self._senses is not None else None
         )
+        self._sight = BySight(self._senses) if self.guard is not None and self._senses is not None else None
         after = (guard.return_s, guard.resume_s) if guard is not None and is_guarded else (0.0, 0.0)
         self.return_s, self.resume_s = after
         self._watch = OwnerWatch(hears=hears) if self._senses is None else self._senses.watch
@@ -115,8 +117,10 @@ class Following:
         return "" if self.guard is None else self.guard.stance.value
 
     def attach(self, vehicle: VehicleLink) -> None:
-        """Hears nothing that the link does not know of by itself; tells the pilot what the guard does."""
+        """Hears the vehicle's fixes; tells the pilot what the guard does."""
         self._vehicle = vehicle
+        if self._sight is not None:
+            self._sight.attach(vehicle)
 
     def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
         self._owner = vehicle.owner
@@ -126,6 +130,9 @@ class Following:
             self._has_looked = self._is_tracked = False
         if self._senses is not None:
             self._senses.sense(vehicle.own, self._owner, image if self._is_fit(image) else None)
+        if self._sight is not None and self.guard is not None:
+            self._sight.step(vehicle.own, image if self._is_fit(image) else None, time_us)
+            self.guard.vel_std = self._sight.std(vehicle.own)
         if self._recorder is not None:
             self._recorder.sense(vehicle.own, self._owner, image if self._is_fit(image) else None)
         since_us = time_us - self._decided_us
@@ -171,6 +178,10 @@ class Following:
         if self._senses is None or not isfinite(own.pos_ned[0]):
             return False
         return isfinite(self._senses.map.room_up_m(own.pos_ned, own.boot_us, LOOKED_UP_US))
+
+    @property
+    def is_by_sight(self) -> bool:
+        return self._sight is not None and self._sight.is_away
 
     def begin(self, own: Own) -> None:
         self._pilot.reset()

@@ -46,6 +46,7 @@ class GoalSkill:
     """
 
     return_s = resume_s = 0.0  # who goes to goals has lost nobody
+    is_by_sight = False
     flying: str
     goals: Goals | OwnerGoal  # this and the next two from `attach` on
     ranges: Ranges

@@ -77,6 +77,11 @@ class Skill(Protocol):
         """Whether something was seen over the vehicle."""
         ...
 
+    @property
+    def is_by_sight(self) -> bool:
+        """Whether GNSS is away, so that the vehicle knows its place by what was flown since."""
+        ...
+
     def begin(self, own: Own) -> None:
         """It takes over: an episode begins, as in training, without memory."""
         ...

@@ -172,3 +172,79 @@ def test_height_jump_of_the_client_takes_the_barometer_along():
     trace = run(default_ekf(EKF2_EV_CTRL=POS | HEIGHT), flight.samples, external=external)[0]
     assert np.all(np.abs(errors(flight, trace).pos[at + TICKS :, 2] + 3.0) < 0.3)
     assert trace["baro"]["reject_count"][-1] == 0
+
+
+def seen_to_move(flight, seed, start):
+    """What a companion's odometry says at 10 Hz, 80 ms late, from a tick on: velocity alone."""
+    external = measured(flight, seed, VEL, delay_ticks=20, every=25)
+    external["time_us"][:start] = 0
+    external["vel_std"] = 0.25
+    return external
+
+
+@pytest.fixture(scope="module")
+def seen_without_gnss():
+    """Flights whose GNSS goes away at 12 s, for 30 s, and what comes of it: with odometry, and without."""
+    away = 12 * TICKS
+    flights = [make_flight(seed=seed, duration_s=60.0) for seed in range(4)]
+    external = np.empty((len(flights), len(flights[0].time_s)), ExternalSample.numpy_dtype())
+    for k, flight in enumerate(flights):
+        silence(flight.samples["gnss"], away, away + 30 * TICKS)
+        external[k] = seen_to_move(flight, k, away)
+    ekf = default_ekf(len(flights), EKF2_EV_CTRL=VEL)
+    return flights, run(ekf, stacked(flights), external=external), away
+
+
+def test_velocity_from_outside_keeps_the_position_while_gnss_is_away(seen_without_gnss):
+    flights, traces, away = seen_without_gnss
+    gone = slice(away + 6 * TICKS, away + 30 * TICKS)
+    flags = traces["estimate"]["flags"][:, gone]
+    assert np.all(flags & VALID == VALID)
+    assert not np.any(flags & DEAD_RECKONING)
+    for flight, trace in zip(flights, traces, strict=True):
+        found = errors(flight, trace)
+        assert np.all(rms(found.vel[gone]) < 0.15)
+        drift_m = np.hypot(*(found.pos[gone.stop - 1] - found.pos[away])[:2])
+        assert drift_m < 3.0 * trace["estimate"]["pos_h_std"][gone.stop - 1]
+        std = trace["estimate"]["pos_h_std"]
+        assert std[gone.stop - 1] > std[away] + 0.05  # it grows, as the error may
+
+
+def test_gnss_that_is_back_sets_the_position_right(seen_without_gnss):
+    flights, traces, away = seen_without_gnss
+    after = slice(away + 37 * TICKS, None)
+    for flight, trace in zip(flights, traces, strict=True):
+        assert np.all(rms(errors(flight, trace).pos[after]) < 1.2)
+        assert np.all(trace["estimate"]["flags"][after] & VALID == VALID)
+
+
+def test_without_velocity_from_outside_the_position_is_lost_as_before():
+    flight = make_flight(seed=0, duration_s=25.0)
+    away = 12 * TICKS
+    silence(flight.samples["gnss"], away)
+    for ctrl, external in ((VEL, None), (0, seen_to_move(flight, 0, away))):
+        flags = run(default_ekf(EKF2_EV_CTRL=ctrl), flight.samples, external=external)[0]["estimate"]["flags"]
+        assert flags[away + 4 * TICKS] & POSITION_VALID
+        assert not flags[away + 6 * TICKS] & POSITION_VALID
+
+
+def test_velocity_from_outside_carries_a_position_for_its_time_and_no_longer():
+    flight = make_flight(seed=1, duration_s=32.0)
+    away = 10 * TICKS
+    silence(flight.samples["gnss"], away)
+    ekf = default_ekf(EKF2_EV_CTRL=VEL, EKF2_EVV_TOUT=15.0)
+    flags = run(ekf, flight.samples, external=seen_to_move(flight, 1, away))[0]["estimate"]["flags"]
+    assert flags[away + 14 * TICKS] & POSITION_VALID
+    assert not flags[away + 16 * TICKS] & POSITION_VALID
+    assert flags[away + 20 * TICKS] & VELOCITY_VALID
+
+
+def test_a_position_is_lost_soon_after_the_velocity_from_outside_ends():
+    flight = make_flight(seed=2, duration_s=32.0)
+    away = 10 * TICKS
+    silence(flight.samples["gnss"], away)
+    external = seen_to_move(flight, 2, away)
+    silence(external, away + 12 * TICKS)
+    flags = run(default_ekf(EKF2_EV_CTRL=VEL), flight.samples, external=external)[0]["estimate"]["flags"]
+    assert flags[away + 15 * TICKS] & POSITION_VALID
+    assert not flags[away + 18 * TICKS] & POSITION_VALID

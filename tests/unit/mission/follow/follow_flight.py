@@ -16,11 +16,21 @@ def config(pace="walk", seed=3, **owner):
 
 
 def following(
-    folder=None, *, pace="walk", seed=3, pilot=None, has_guard=True, settings=None, dialect="px4", links=(), **owner
+    folder=None,
+    *,
+    pace="walk",
+    seed=3,
+    pilot=None,
+    has_guard=True,
+    settings=None,
+    dialect="px4",
+    links=(),
+    parameters=None,
+    **owner,
 ):
     """A flight that follows, and its companion."""
     guard = GuardSettings(is_on=has_guard, **(settings or {}))
-    made = config(pace, seed, **owner).model_copy(update={"dialect": dialect})
+    made = config(pace, seed, **owner).model_copy(update={"dialect": dialect, "parameters": parameters or {}})
     flight, companion = flight_with_companion(
         made, pilot or ScriptedFollower(), links=links, folder=folder, guard=guard
     )

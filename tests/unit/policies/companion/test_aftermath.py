@@ -117,6 +117,13 @@ def test_an_owner_who_is_seen_meanwhile_begins_the_wait_anew():
     assert bench.step(1.1, **LOST).wishes == [Wish.RETURN]
 
 
+def test_nobody_is_sent_home_without_gnss():
+    bench = Bench().left_alone().step(3.0 * RETURN_S, is_by_sight=True, **LOST)
+    assert bench.wishes == []
+    assert bench.step(RETURN_S - 1.0, **LOST).wishes == []  # from when GNSS is back
+    assert bench.step(1.1, **LOST).wishes == [Wish.RETURN]
+
+
 def test_a_phone_that_is_heard_is_not_an_owner_who_is_seen():
     assert Bench().left_alone().step(RETURN_S + 0.1, is_alone=True).wishes == [Wish.RETURN]  # without trouble: ready
 

@@ -6,7 +6,7 @@ import pytest
 from common.attitude import quat_of
 from common.image_stream import ImageFrame
 from policies.companion.guard.guard import Guard, Stance
-from policies.companion.guard.interventions import HEIGHT, TILTED
+from policies.companion.guard.interventions import HEIGHT, NO_GNSS, TILTED
 from policies.companion.guard.settings import GuardSettings, guard_settings
 from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
@@ -287,3 +287,31 @@ def test_a_search_passes_over_the_heads_of_people_but_not_through_them(
     guard.begin(own)
     ahead = searched(guard, own, 17.0, 10.0)[-1][0]
     assert ahead < 0.5 if is_in_the_way else ahead > 2.0
+
+
+def test_without_gnss_it_is_as_fast_as_its_velocity_is_known(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, sees = scene
+    sees.ahead_m = 9.0
+    free = flown(guard, own, 2.0)[-1]
+    speeds = []
+    for guard.vel_std in (0.1, 0.6, 0.7, 0.8, 2.0):
+        speeds.append(flown(guard, own, 2.0)[-1])
+    assert speeds[0] == pytest.approx(free)
+    assert free > speeds[1] > speeds[2] > 0.0
+    assert speeds[3:] == [0.0, 0.0]
+    assert guard.interventions[NO_GNSS] > 0
+
+
+def test_without_gnss_it_stays_where_it_lost_the_owner_and_gives_up_sooner(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, sees = scene
+    guard.begin(own)
+    flown(guard, own, 1.0)
+    sees.is_there, guard.vel_std = False, 0.1
+    speeds = flown(guard, own, 19.0)
+    assert guard.stance is Stance.SEARCH
+    assert all(abs(speed) < 1e-6 for speed in speeds[21:])
+    assert not guard.is_lost(own)
+    flown(guard, own, 3.0)
+    assert guard.is_lost(own)
+    guard.vel_std = None  # GNSS is back: there is time to search
+    assert not guard.is_lost(own)

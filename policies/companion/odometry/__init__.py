@@ -1,0 +1,1 @@
+"""How fast the vehicle moves, by its pictures: visual odometry of a companion."""

@@ -1,0 +1,140 @@
+"""When a companion tells the vehicle how fast it goes by sight, and for how good it takes that."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.mavlink.transport.links import memory_pair
+from autopilot.mavlink.wire.codec import FrameReader, decode, encode
+from common.image_stream import ImageFrame
+from policies.companion.odometry.by_sight import AWAY_US, BACK_US, DRIFT_M_S2, INERTIAL_STD_M_S, BySight
+from policies.companion.senses.senses import Senses
+from policies.companion.vehicle_link import VehicleLink
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, TILT_DEG
+
+STEP_US = 20_000
+
+
+class Blind:
+    """A detector that sees nobody."""
+
+    def find(self, pixels: object, down_frd: object) -> list[object]:  # noqa: ARG002
+        return []
+
+
+class Bench:
+    """A vehicle that hovers over a ground of blots, and what its companion says."""
+
+    def __init__(self) -> None:
+        self.end, companion_end = memory_pair()
+        self.link = VehicleLink(companion_end)
+        self.senses = Senses(detector=Blind())  # type: ignore[arg-type]
+        self.sight = BySight(self.senses)
+        self.sight.attach(self.link)
+        self.us, self.reader, self.sent = 0, FrameReader(), []  # type: ignore[var-annotated]
+        self.tell("HEARTBEAT", autopilot=int(PX4.autopilot), base_mode=128)
+        rng = np.random.default_rng(1)
+        self.ground = np.kron(rng.integers(40, 215, (16, 16, 3)), np.ones((4, 4, 1))).astype(np.uint8)
+
+    def tell(self, name: str, **fields: object) -> None:
+        self.end.send(encode(name, 1, 1, 0, **fields))
+
+    def run(self, seconds: float, fix: int | None, *, has_images: bool = True) -> None:
+        """Telemetry at 50 Hz, fixes at 5 Hz, pictures at 10 Hz.
+
+        Args:
+            seconds: so long.
+            fix: its type; None: none is told.
+            has_images: pictures come.
+        """
+        for _ in range(round(seconds * 1e6 / STEP_US)):
+            self.us += STEP_US
+            self.tell("ATTITUDE_QUATERNION", time_boot_ms=self.us // 1000, q1=1.0)
+            self.tell("LOCAL_POSITION_NED", time_boot_ms=self.us // 1000, z=-2.0)
+            if fix is not None and self.us % 200_000 == 0:
+                self.tell("GPS_RAW_INT", fix_type=fix)
+            self.link.receive(self.us)
+            image = self.image() if has_images and self.us % 100_000 == 0 else None
+            self.senses.sense(self.link.own, self.link.owner, None)
+            self.sight.step(self.link.own, image, self.us)
+            for data in self.end.receive():
+                self.sent += [decode(frame) for frame in self.reader.feed(data)]
+
+    def image(self) -> ImageFrame:
+        """Taken 40 ms ago, from a lens 2 m before a wall, noise on it."""
+        pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 85, np.uint8)
+        noise = np.random.default_rng(self.us).integers(-3, 4, self.ground.shape)
+        pixels[..., :3] = np.clip(self.ground.astype(int) + noise, 0, 255)
+        return ImageFrame(self.us - 40_000, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
+
+    def named(self, name: str) -> list[object]:
+        return [message.fields for message in self.sent if message.name == name]
+
+    @property
+    def texts(self) -> list[str]:
+        return [str(fields.text) for fields in self.named("STATUSTEXT")]  # type: ignore[attr-defined]
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_with_gnss_nothing_is_measured_and_nothing_said(bench: Bench) -> None:
+    bench.run(3.0, 3)
+    assert bench.named("VISION_SPEED_ESTIMATE") == []
+    assert bench.sight.std(bench.link.own) is None
+    assert bench.texts == []
+
+
+def test_a_vehicle_that_never_had_gnss_has_lost_none(bench: Bench) -> None:
+    bench.run(3.0, 0)
+    assert not bench.sight.is_away
+    assert bench.named("VISION_SPEED_ESTIMATE") == []
+
+
+@pytest.mark.parametrize("fix", [0, 1, None])
+def test_without_a_fix_it_tells_ten_times_a_second_how_fast_it_goes(bench: Bench, fix: int | None) -> None:
+    bench.run(1.0, 3)
+    bench.run(3.0, fix)
+    told = bench.named("VISION_SPEED_ESTIMATE")
+    assert len(told) == pytest.approx(10.0 * (3.0 - AWAY_US * 1e-6), abs=3.0)
+    for fields in told:
+        assert max(abs(fields.x), abs(fields.y), abs(fields.z)) < 0.3  # type: ignore[attr-defined]
+        assert all(np.isfinite(fields.covariance))  # type: ignore[attr-defined]
+        assert fields.covariance[0] > 0.1**2  # type: ignore[attr-defined]
+    stamps = [fields.usec for fields in told]  # type: ignore[attr-defined]
+    assert all(after - before == 100_000 for before, after in pairwise(stamps))
+    assert stamps[-1] == bench.us - 190_000  # between the two pictures that came before the newest
+    assert bench.texts == ["Companion: no GNSS: by sight"]
+
+
+def test_it_stops_when_gnss_is_back_for_a_while_and_says_so(bench: Bench) -> None:
+    bench.run(1.0, 3)
+    bench.run(3.0, 0)
+    bench.run(BACK_US * 1e-6 - 0.5, 3)
+    assert bench.sight.is_away
+    bench.run(1.0, 3)
+    assert not bench.sight.is_away
+    count = bench.sight.count
+    bench.run(1.0, 3)
+    assert bench.sight.count == count
+    assert bench.texts[-1] == "Companion: GNSS is back"
+
+
+def test_without_pictures_the_velocity_is_known_worse_and_worse(bench: Bench) -> None:
+    bench.run(1.0, 3)
+    bench.run(3.0, 0, has_images=False)
+    lost_s = 3.0 - AWAY_US * 1e-6
+    assert bench.sight.std(bench.link.own) == pytest.approx(INERTIAL_STD_M_S + DRIFT_M_S2 * lost_s, abs=0.05)
+    assert bench.texts == []
+
+
+def test_fixes_of_another_vehicle_are_none_of_its_own(bench: Bench) -> None:
+    bench.run(1.0, 3)
+    for _ in range(10):
+        bench.end.send(encode("GPS_RAW_INT", 2, 1, 0, fix_type=3))
+        bench.run(0.2, None)
+    assert bench.sight.is_away
