@@ -53,11 +53,9 @@ reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in two leg
 	@$(BIN)/python -m bench.training_seeds navigate $(ARGS)
 	@$(BIN)/python -m bench.navigate results/navigate-chosen.pt
 
-reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policies from nothing, three seeds of each, choose and judge them (an hour); without training: ARGS="judge"
+reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policy from nothing, three seeds, choose and judge it (half an hour); without training: ARGS="judge"
 	@$(BIN)/python -m bench.training_seeds navigate-rover $(ARGS)
-	@$(BIN)/python -m bench.training_seeds navigate-rover-follow $(ARGS)
 	@$(BIN)/python -m bench.navigate_rover results/navigate-rover-chosen.pt
-	@$(BIN)/python -m bench.follow_rover results/navigate-rover-follow-chosen.pt
 
 reproduce-offline: $(STAMP) ## Log flights, learn from their logs alone, forecast, then fly: to follow, park and navigate; one: ARGS="--story park"
 	@$(BIN)/python -m bench.offline_story $(ARGS)
