@@ -164,7 +164,7 @@ STORIES = {
     "navigate": Story(
         task="Navigate",
         benchmark="navigate",
-        pilots={"clumsy": "bench.offline_story.pilots:ClumsyNavigator", "shipped": "navigate-late"},
+        pilots={"clumsy": "bench.offline_story.pilots:ClumsyNavigator", "shipped": "navigate"},
         sizes={"clumsy": 240, "shipped": 120, "flown": 24},
         steps=10_000,
         forecast_steps=2000,
