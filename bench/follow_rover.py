@@ -10,12 +10,14 @@ from pathlib import Path
 
 from bench.follow.flights import FIRST_SEED, SECONDS, fly
 from bench.follow.stages import CELLS
+from bench.page_section import kept_from
 from bench.row import machine
 from common.files import write_whole
 from policies.companion.skills.load_skill import load_follower
 from policies.tasks.follow_me.scorecard import NAMES, Scorecard, scorecard, written
 
 DRIVES = 40  # of each kind
+COMPARED = "## By the detector of people"  # a section that stays as it is
 FIGURES = ("success", "tracking", "collision", "in_band", "distance_median_m", "in_view", "losses_per_minute")
 PAGE_FILE = Path(__file__).parent.parent / "docs" / "results" / "follow-rover.md"
 PAGE = """\
@@ -59,7 +61,7 @@ def main(arguments: list[str]) -> int:
         rows="\n".join(rows),
         machine=machine(),
     )
-    write_whole(PAGE_FILE, page.encode())
+    write_whole(PAGE_FILE, (page + kept_from(PAGE_FILE.read_text(), COMPARED)).encode())
     return 0
 
 
