@@ -7,6 +7,8 @@ its success on test positions would be to train on them.
 
 from dataclasses import dataclass
 
+from policies.learn.config.behavior import Behavior
+from policies.learn.config.offline import OfflineHyperparameters
 from policies.learn.curriculum import Curriculum, RecentEpisodes
 from policies.learn.evaluate import Evaluation, evaluate
 from policies.learn.networks.policy import Policy
@@ -54,3 +56,11 @@ class SuccessTarget:
         scores = recent.scores
         rate = scores.count(Outcome.SUCCESS) / max(scores.episode_count, 1)
         return scores.episode_count >= recent.least and rate >= 1.0 - 5.0 * (1.0 - self.fraction)
+
+
+def target_of(behavior: Behavior, task_name: str, settings: TaskSettings) -> SuccessTarget | None:
+    """What policies in a training are held against; None: nothing, or what a dataset is learnt from by itself."""
+    is_offline = isinstance(behavior.hyperparameters, OfflineHyperparameters)
+    if behavior.success_target is None and (is_offline or not behavior.keep_best):
+        return None
+    return SuccessTarget(behavior.success_target, task_name, settings)

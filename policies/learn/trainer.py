@@ -20,7 +20,6 @@ from policies.learn.best_policy import BestPolicy
 from policies.learn.build_learner import build_learner, remarks
 from policies.learn.checkpoint_compatibility import flat, require_fit, settings_that_must_fit
 from policies.learn.config.network import NetworkSettings
-from policies.learn.config.offline import OfflineHyperparameters
 from policies.learn.config.run import RunConfig
 from policies.learn.curriculum import Curriculum, RecentEpisodes
 from policies.learn.evaluate import Evaluation
@@ -30,7 +29,7 @@ from policies.learn.export.policy_path import CheckpointError
 from policies.learn.export.provenance import code_record, data_records, teacher_record
 from policies.learn.networks.policy import Policy
 from policies.learn.processes import check_processes, together
-from policies.learn.success_target import SuccessTarget
+from policies.learn.success_target import target_of
 from policies.learn.torch_threads import few_threads
 from policies.learn.training_curves import EventFile, Period
 from policies.learn.training_run_folder import RunError, RunFolder, starting_point
@@ -155,10 +154,7 @@ class Training:
         self._saved: list[dict[str, Any]] = []
         self._parents: list[dict[str, Any]] = []
         self._teacher, self._data = teacher_record(self.behavior), data_records(self.behavior)
-        fraction = self.behavior.success_target
-        is_offline = isinstance(self.behavior.hyperparameters, OfflineHyperparameters)
-        is_judged = fraction is not None or (self.behavior.keep_best and not is_offline)
-        self._target = SuccessTarget(fraction, self.task_name, self.task_settings) if is_judged else None
+        self._target = target_of(self.behavior, self.task_name, self.task_settings)
         self._judged: Evaluation | None = None
         self._best = BestPolicy()
         self._moments: deque[tuple[float, int]] = deque(maxlen=_RATE_ITERATIONS + 1)
