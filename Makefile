@@ -49,11 +49,11 @@ reproduce-cars: $(STAMP) ## Train every row of docs/results/cars.md from scratch
 reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow.md (hours); flags: ARGS="student"
 	@$(BIN)/python -m bench.follow $(ARGS)
 
-reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in two legs of three seeds, choose and judge it (two hours); without training: ARGS="judge"
+reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in two legs of three seeds, choose and judge it (three quarters of an hour); without training: ARGS="judge"
 	@$(BIN)/python -m bench.training_seeds navigate $(ARGS)
 	@$(BIN)/python -m bench.navigate results/navigate-chosen.pt
 
-reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policy from nothing, three seeds, choose and judge it (half an hour); without training: ARGS="judge"
+reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policy from nothing, three seeds, choose and judge it (a quarter of an hour); without training: ARGS="judge"
 	@$(BIN)/python -m bench.training_seeds navigate-rover $(ARGS)
 	@$(BIN)/python -m bench.navigate_rover results/navigate-rover-chosen.pt
 
