@@ -56,6 +56,7 @@ _CLIMB_LPF_GAIN = wp.constant(0.05)  # per fix
 _TERRAIN_AFTER_S = wp.constant(2.0)
 _MAX_TILT_VAR = wp.constant(0.01)  # rad²: 6 deg
 _MAX_YAW_VAR = wp.constant(0.07)  # rad²: 15 deg
+_CARRYING_VEL_VAR = wp.constant(0.16)  # (0.4 m/s)²: a velocity known no better carries no position; odometry keeps 0.1
 _MAX_WIND_VAR = wp.constant(9.0)  # (3 m/s)²
 _MAX_POS_VAR = wp.constant(2500.0)  # (50 m)²
 _MIN_VAR = wp.constant(1.0e-12)
@@ -193,6 +194,8 @@ def flags(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, state: 
         pos_s = wp.min(pos_s, external_pos_s)
         vel_s = wp.min(pos_s, seconds_since(now_us, state.gnss_vel.fused_time_us))
         external_vel_s = seconds_since(now_us, state.external_vel.fused_time_us)
+        if wp.max(cov[i, VEL][VEL], cov[i, VEL + 1][VEL + 1]) > _CARRYING_VEL_VAR:
+            external_vel_s = params.no_aid_s  # what says so little carries nothing
         vel_s = wp.min(vel_s, external_vel_s)
         wheels_s = seconds_since(now_us, state.wheels.fused_time_us)
         if pos_s < carried_s(params, wheels_s, external_vel_s) and cov[i, POS][POS] < _MAX_POS_VAR:

@@ -42,6 +42,7 @@ class OwnerGoal:
         self._vehicle, self._camera, self._settings = vehicle, camera, settings
         self._senses, self._watch = senses, senses.watch
         self._owner: PersonNow | None = None  # by sights, or if those are old by the phone too
+        self._last: PersonNow | None = None  # as of the last word of them, seen or heard
         self.done = LOST
         self.may_search = False
         """It drives, under a guard: else who is lost is lost at once."""
@@ -59,6 +60,8 @@ class OwnerGoal:
         if abs(own.boot_us - self._known_us) > IMAGE_OLD_US:
             self._watch.update(own.boot_us, own, owner, None)
         self._owner = self._senses.owner_now(own)
+        if self._silence_s <= self._settings.slow_s:
+            self._last = self._owner
         self._tell()
 
     @property
@@ -80,15 +83,13 @@ class OwnerGoal:
     def is_searching(self) -> bool:
         """They are neither seen nor heard of, and it may look for them."""
         s = self._settings
-        return self.may_search and self._senses.seen.sights > 0 and s.search_s < self._silence_s <= s.lost_s
+        return self.may_search and self._last is not None and s.search_s < self._silence_s <= s.lost_s
 
     @property
     def goal(self) -> Goal | None:
         """Where the owner is, or is looked for; None: lost."""
-        if self.is_searching:
-            seen = self._senses.seen
-            place, velocity = seen.now(seen.time_us)
-            north, east = place[:2] + AHEAD_S * velocity[:2]
+        if self.is_searching and self._last is not None:
+            north, east = self._last.pos_ned[:2] + AHEAD_S * self._last.vel
             return Goal((float(north), float(east), nan), "where the owner was going")
         if self._owner is None or self._silence_s > self._settings.search_s:
             return None

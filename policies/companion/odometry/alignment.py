@@ -18,12 +18,15 @@ from policies.companion.odometry.view import View
 Floats = NDArray[np.floating[Any]]
 _STEPS = (6, 6)  # at most, at half the size and at the whole
 _STILL_M = 2e-4  # a smaller step is the last
+_SETTLED_M = 0.02  # and after a larger last one nothing is known; guess
 _NEAR_M = 0.3  # nearer nothing is put into a picture
 _MARGIN = 1.0  # [pixels] from the edge, where slopes are known
 _LEAST_POINTS = 60  # of a view; fewer say nothing
 _GREY_LEAST = 1.0  # what grey differs at least by: noise, rounding
 _INVERSE_LEAST = 0.02  # [1/m] and inverse depth; three times what it does: rounding of level ground stays where it is
+_GREY_NOISE, _INVERSE_NOISE = 0.15, 0.1  # of a slope over that of a difference, squared, where all is noise; computed
 _FITS = 2.0  # times the usual difference: half of the weight is lost there
+_NOBODY_KNOWS = 1e-3  # [1/m²] a way is known no worse
 _THIN = 2  # at the whole size every second point in both directions counts: neighbours say the same
 
 
@@ -85,7 +88,9 @@ def _aligned(
         moved = moved + way.moved
         if float(np.abs(way.moved).max()) < _STILL_M:
             break
-    return None if way is None else Way(moved, way.cov, way.fitting, way.points)
+    if way is None or float(np.abs(way.moved).max()) > _SETTLED_M:
+        return None
+    return Way(moved, way.cov, way.fitting, way.points)
 
 
 def _step(second: View, points: Floats, grey: Floats) -> Way | None:
@@ -121,11 +126,29 @@ def _step(second: View, points: Floats, grey: Floats) -> Way | None:
     grey_weighted = by_grey * (grey_fits / grey_std**2)[:, None]
     depth_weighted = by_depth * (depth_fits / gap_std**2)[:, None]
     information = (grey_weighted.T @ by_grey + depth_weighted.T @ by_depth).astype(np.float64)
-    information += 1e-3 * np.eye(3)  # [1/m²] a way nobody knows is not infinite
     slope = (grey_weighted.T @ differs + depth_weighted.T @ gaps).astype(np.float64)
-    cov = np.asarray(np.linalg.inv(information), np.float64)
+    step = -np.linalg.solve(information + _NOBODY_KNOWS * np.eye(3), slope)
+    noise = _noise_information(right, down, scaled, _GREY_NOISE * grey_fits + _INVERSE_NOISE * depth_fits)
     fitting = float(((grey_fits > 0.25) & (depth_fits > 0.25)).mean())  # within FITS times what is usual
-    return Way(np.asarray(-cov @ slope, np.float64), cov, fitting, len(inverse))
+    return Way(np.asarray(step, np.float64), _cov(information - noise), fitting, len(inverse))
+
+
+def _noise_information(right: Floats, down: Floats, scaled: Floats, share: Floats) -> NDArray[np.float64]:
+    """(3, 3) [1/m²] what slopes would seem to tell if they were noise alone, a share of what differs.
+
+    Ground without any texture would be measured with great confidence otherwise.
+    """
+    none = np.zeros_like(scaled)
+    across = np.stack([-scaled, none, scaled * right], -1)
+    upright = np.stack([none, -scaled, scaled * down], -1)
+    weighted = share[:, None]
+    return np.asarray((weighted * across).T @ across + (weighted * upright).T @ upright, np.float64)
+
+
+def _cov(information: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, 3) [m²] of an information that may be nothing or less in some direction, which nobody knows then."""
+    values, vectors = np.linalg.eigh(information)
+    return np.asarray((vectors / np.maximum(values, _NOBODY_KNOWS)) @ vectors.T, np.float64)
 
 
 def _sampled(planes: Floats, column: Floats, row: Floats) -> Floats:

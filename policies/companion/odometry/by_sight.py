@@ -19,8 +19,10 @@ from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
 
 FIX_HZ = 5.0
-AWAY_US = 600_000  # so long without a fix GNSS is away: three messages
-BACK_US = 2_000_000  # so long with one it is back: the estimator has used it by then
+AWAY_US = 600_000  # so long told of no fix GNSS is away: three messages;
+SILENT_US = 3_000_000  # told nothing, after so long: some receivers tell once a second
+BACK_US = 6_000_000  # so long with one it is back: after 5 s of fixes that do not fit the estimate is set to them
+MOST_STD_M_S = 0.8  # who is surer of nothing has not measured
 SETTLED_US = 15_000_000  # and after so long the estimate has come to it: after 5 s of rejected fixes it is set
 DRIFT_M_S2 = 0.1  # a velocity that nobody measures goes off by so much: half a degree of tilt; guess
 INERTIAL_STD_M_S = 0.1  # when it was measured last
@@ -40,7 +42,9 @@ class BySight:
         self._senses = senses
         self._odometry = VisualOdometry()
         self._vehicle: VehicleLink | None = None
-        self._fixed_us = NEVER_US  # the last fix, on the companion's clock
+        self._boot_us = 0  # the vehicle's clock
+        self._heard_us = NEVER_US  # the last word of fixes, on the companion's clock
+        self._fixed_us = NEVER_US  # the last fix, likewise
         self._missed_us = NEVER_US  # when there was none last
         self._waiting: ImageFrame | None = None  # for its attitude
         self.is_away = False
@@ -59,6 +63,7 @@ class BySight:
     def _fix_heard(self, system: int, component: int, fields: Any, time_us: int) -> None:
         if self._vehicle is None or (system, component) != (self._vehicle.system_id, AUTOPILOT_COMPONENT):
             return
+        self._heard_us = time_us
         if fields.fix_type >= _FIX_3D:
             self._fixed_us = time_us
         else:
@@ -72,6 +77,10 @@ class BySight:
             image: a new one; None: there is none. It is looked at in a later step: decisions come first.
             time_us: the companion's clock.
         """
+        if own.boot_us < self._boot_us:  # it has restarted: what was measured was at no time that it knows
+            self._fixed_us, self.is_away, self.motion, self._waiting = NEVER_US, False, None, None
+            self._odometry.forget()
+        self._boot_us = own.boot_us
         self._judge(own, time_us)
         if image is not None:
             self._waiting = image if self.is_away else None
@@ -92,7 +101,8 @@ class BySight:
         vehicle = self._vehicle
         if vehicle is None or self._fixed_us == NEVER_US:
             return
-        if time_us - self._fixed_us >= AWAY_US:
+        is_told = self._missed_us > self._fixed_us and time_us - self._fixed_us >= AWAY_US
+        if is_told or time_us - self._heard_us >= SILENT_US:
             self._missed_us = time_us
             if not self.is_away:
                 self.is_away, self._away_us, self.motion = True, own.boot_us, None
@@ -112,7 +122,7 @@ class BySight:
             return
         self._waiting = None
         motion = self._odometry.see(image.pixels, pose, self._people(own, pose), own.vel_ned)
-        if motion is not None and self._vehicle is not None:
+        if motion is not None and motion.std < MOST_STD_M_S and self._vehicle is not None:
             if self.motion is None:
                 self._vehicle.say("Companion: no GNSS: by sight")
             self.motion = motion

@@ -8,6 +8,7 @@ were seen. Positions of others by GNSS move along, so that they are where they a
 """
 
 from common.attitude import Vector
+from policies.companion.vehicle_clock import REORDERED_MS
 
 _GAP_S = 0.5  # after a longer silence nobody knows what it has flown
 
@@ -30,7 +31,10 @@ class SteadyFrame:
             pos_ned: [m] as the vehicle tells it.
             vel_ned: [m/s] likewise.
         """
-        last, self._last = self._last, (boot_us, pos_ned, vel_ned)
+        last = self._last
+        if last is not None and -REORDERED_MS <= (boot_us - last[0]) // 1000 < 0:
+            return self.of(pos_ned)  # messages overtook each other
+        self._last = (boot_us, pos_ned, vel_ned)
         if last is not None and boot_us < last[0]:  # it has restarted: another frame
             self.shift_ne, last = (0.0, 0.0), None
         if self.is_watched and last is not None:

@@ -74,18 +74,21 @@ def test_a_flight_is_shown_and_written(task, condition, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("task", "condition", "built_as"),
-    [("navigate", "200-late-0", ("Navigate",)), ("park", "calm", ("Drive", "--env-args", "preset=park"))],
+    ("task", "condition", "seed", "built_as"),
+    [
+        ("navigate", "200-late-0", 500_002, ("Navigate",)),
+        ("park", "calm", 500_000, ("Drive", "--env-args", "preset=park")),
+    ],
 )
-def test_a_recorded_flight_goes_as_another_and_becomes_a_dataset(task, condition, built_as, tmp_path):
+def test_a_recorded_flight_goes_as_another_and_becomes_a_dataset(task, condition, seed, built_as, tmp_path):
     flights, out, dataset = (tmp_path / name for name in ("flights", "out", "set"))
-    words = ("--condition", condition, "--flights", "1", "--jobs", "1", "--seed", "500000", "--out", str(out))
+    words = ("--condition", condition, "--flights", "1", "--jobs", "1", "--seed", str(seed), "--out", str(out))
     result = honeyguide(task, *words, "--record", str(flights))
     assert result.exit_code in {0, 1}, result.output
-    assert [path.name for path in flights.iterdir()] == [f"{condition}-seed500000"]
+    assert [path.name for path in flights.iterdir()] == [f"{condition}-seed{seed}"]
     (recorded,) = json.loads((out / "flights.json").read_text())["flights"][condition]
     benchmark = benchmark_of(task)
-    unrecorded = benchmark.fly(benchmark.load(TASKS[task][1]), condition, 500_000, GuardSettings(), KeptFlight())
+    unrecorded = benchmark.fly(benchmark.load(TASKS[task][1]), condition, seed, GuardSettings(), KeptFlight())
     assert recorded == asdict(unrecorded)
     built = CliRunner().invoke(app, ["dataset", "build", str(flights), "-o", str(dataset), "--task", *built_as])
     assert built.exit_code == 0, built.output
@@ -95,7 +98,7 @@ def test_a_recorded_flight_goes_as_another_and_becomes_a_dataset(task, condition
     assert (episode.outcome, episode.context["pilot"]) == ("success", TASKS[task][1])
     again = honeyguide(task, *words, "--record", str(flights))
     assert again.exit_code == 2
-    assert f"--record: {flights / condition}-seed500000 is there already" in again.stderr
+    assert f"--record: {flights / condition}-seed{seed} is there already" in again.stderr
 
 
 def test_the_guard_keeps_a_rover_at_full_throttle_off_what_stands_round_it():

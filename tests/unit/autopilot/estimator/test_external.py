@@ -191,7 +191,7 @@ def seen_without_gnss():
     for k, flight in enumerate(flights):
         silence(flight.samples["gnss"], away, away + 30 * TICKS)
         external[k] = seen_to_move(flight, k, away)
-    ekf = default_ekf(len(flights), EKF2_EV_CTRL=VEL)
+    ekf = default_ekf(len(flights), EKF2_EV_CTRL=VEL, EKF2_EVV_TOUT=60.0)
     return flights, run(ekf, stacked(flights), external=external), away
 
 
@@ -248,3 +248,13 @@ def test_a_position_is_lost_soon_after_the_velocity_from_outside_ends():
     flags = run(default_ekf(EKF2_EV_CTRL=VEL), flight.samples, external=external)[0]["estimate"]["flags"]
     assert flags[away + 15 * TICKS] & POSITION_VALID
     assert not flags[away + 18 * TICKS] & POSITION_VALID
+
+
+def test_a_velocity_that_says_next_to_nothing_carries_no_position():
+    flight = make_flight(seed=1, duration_s=32.0)
+    away = 10 * TICKS
+    silence(flight.samples["gnss"], away)
+    external = seen_to_move(flight, 1, away)
+    external["vel_std"] = 30.0
+    flags = run(default_ekf(EKF2_EV_CTRL=VEL), flight.samples, external=external)[0]["estimate"]["flags"]
+    assert not flags[away + 20 * TICKS] & POSITION_VALID

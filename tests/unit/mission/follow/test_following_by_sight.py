@@ -13,6 +13,7 @@ from mission.follow.benchmark.pilots import any_pilot
 from mission.follow.follow_options import BY_SIGHT
 from policies.companion.engagement import Phase
 from policies.companion.names import FOLLOWER
+from policies.companion.odometry.by_sight import BACK_US
 from tests.unit.mission.follow.follow_flight import advance, following, hide
 
 SIGHT_LOST_S = 20.0
@@ -82,7 +83,7 @@ def test_its_velocity_is_known_and_its_position_valid_all_the_time(outage):
 
 def test_it_measures_only_while_gnss_is_away_and_says_so_once(outage):
     assert 220 < outage.sent <= 250
-    assert outage.sent_after - outage.sent < 40
+    assert outage.sent_after - outage.sent < 10 * BACK_US * 1e-6 + 20
     assert [text for text in outage.texts if "GNSS" in text] == [
         "Companion: no GNSS: by sight",
         "Companion: GNSS is back",

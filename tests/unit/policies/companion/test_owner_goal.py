@@ -181,3 +181,12 @@ def test_who_is_lost_before_it_drives_is_lost_at_once():
     scene.goal.may_search, scene.shows.place = False, None
     scene.pass_by(GUARD.search_s + 0.2, pixels=BLANK)
     assert scene.goal.goal is None
+
+
+def test_who_was_heard_of_after_the_last_sight_is_looked_for_from_there():
+    scene = walking()
+    scene.shows.place = None
+    scene.pass_by(20.0, (8.0, 0.0, -1.0), (0.0, 1.5, 0.0), pixels=BLANK)
+    scene.pass_by(GUARD.search_s + 1.5, pixels=BLANK)
+    assert scene.goal.is_searching
+    assert scene.goal.goal.pos_ned[1] > 20.0

@@ -1,5 +1,6 @@
 """When a companion tells the vehicle how fast it goes by sight, and for how good it takes that."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +10,7 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.transport.links import memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from common.image_stream import ImageFrame
-from policies.companion.odometry.by_sight import AWAY_US, BACK_US, DRIFT_M_S2, INERTIAL_STD_M_S, BySight
+from policies.companion.odometry.by_sight import AWAY_US, BACK_US, DRIFT_M_S2, INERTIAL_STD_M_S, SILENT_US, BySight
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import VehicleLink
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, TILT_DEG
@@ -95,12 +96,14 @@ def test_a_vehicle_that_never_had_gnss_has_lost_none(bench: Bench) -> None:
     assert bench.named("VISION_SPEED_ESTIMATE") == []
 
 
-@pytest.mark.parametrize("fix", [0, 1, None])
-def test_without_a_fix_it_tells_ten_times_a_second_how_fast_it_goes(bench: Bench, fix: int | None) -> None:
+@pytest.mark.parametrize(("fix", "after_us"), [(0, AWAY_US), (1, AWAY_US), (None, SILENT_US)])
+def test_without_a_fix_it_tells_ten_times_a_second_how_fast_it_goes(
+    bench: Bench, fix: int | None, after_us: int
+) -> None:
     bench.run(1.0, 3)
-    bench.run(3.0, fix)
+    bench.run(6.0, fix)
     told = bench.named("VISION_SPEED_ESTIMATE")
-    assert len(told) == pytest.approx(10.0 * (3.0 - AWAY_US * 1e-6), abs=3.0)
+    assert len(told) == pytest.approx(10.0 * (6.0 - after_us * 1e-6), abs=3.0)
     for fields in told:
         assert max(abs(fields.x), abs(fields.y), abs(fields.z)) < 0.3  # type: ignore[attr-defined]
         assert all(np.isfinite(fields.covariance))  # type: ignore[attr-defined]
@@ -134,7 +137,34 @@ def test_without_pictures_the_velocity_is_known_worse_and_worse(bench: Bench) ->
 
 def test_fixes_of_another_vehicle_are_none_of_its_own(bench: Bench) -> None:
     bench.run(1.0, 3)
-    for _ in range(10):
+    for _ in range(20):
         bench.end.send(encode("GPS_RAW_INT", 2, 1, 0, fix_type=3))
         bench.run(0.2, None)
     assert bench.sight.is_away
+
+
+def test_over_what_has_no_texture_nothing_is_told(bench: Bench) -> None:
+    bench.ground[:] = 120
+    bench.run(1.0, 3)
+    bench.run(4.0, 0)
+    assert bench.named("VISION_SPEED_ESTIMATE") == []
+    std = bench.sight.std(bench.link.own)
+    assert std is not None
+    assert std > INERTIAL_STD_M_S + 3.0 * DRIFT_M_S2
+
+
+def test_a_receiver_that_tells_once_a_second_is_there(bench: Bench) -> None:
+    for _ in range(5):
+        bench.tell("GPS_RAW_INT", fix_type=3)
+        bench.run(1.0, None)
+    assert not bench.sight.is_away
+
+
+def test_what_was_measured_before_a_restart_of_the_vehicle_counts_no_more(bench: Bench) -> None:
+    bench.run(1.0, 3)
+    bench.run(3.0, 0)
+    assert bench.sight.motion is not None
+    own = replace(bench.link.own, boot_us=1000)
+    bench.sight.step(own, None, bench.us)
+    assert bench.sight.motion is None
+    assert not bench.sight.is_away

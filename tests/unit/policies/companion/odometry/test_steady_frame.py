@@ -41,7 +41,7 @@ def test_a_jump_that_nobody_watches_is_passed_on():
 def test_a_restart_begins_with_the_vehicles_own_frame():
     frame = SteadyFrame()
     frame.is_watched = True
-    flown(frame, 100, start=100, jump=(3.0, 0.0, 0.0))
+    flown(frame, 100, start=1000, jump=(3.0, 0.0, 0.0))
     assert flown(frame, 1)[0] == 0.0
     assert frame.shift_ne == (0.0, 0.0)
 
@@ -51,3 +51,11 @@ def test_what_was_flown_while_nothing_was_heard_is_no_correction():
     frame.is_watched = True
     frame.steady(0, (0.0, 0.0, 0.0), VEL_NED)
     assert frame.steady(3_000_000, (6.5, -3.5, 0.0), VEL_NED)[0] == 6.5
+
+
+def test_a_message_that_was_overtaken_changes_nothing():
+    frame = SteadyFrame()
+    frame.is_watched = True
+    flown(frame, 100, jump=(3.0, -2.0, 0.0))
+    frame.steady(20_000 * 99 - 10_000, (0.0, 0.0, 0.0), VEL_NED)
+    assert frame.shift_ne == pytest.approx((3.0, -2.0))
