@@ -133,15 +133,15 @@ def _step(second: View, points: Floats, grey: Floats) -> Way | None:
     return Way(np.asarray(step, np.float64), _cov(information - noise), fitting, len(inverse))
 
 
-def _noise_information(right: Floats, down: Floats, scaled: Floats, share: Floats) -> NDArray[np.float64]:
-    """(3, 3) [1/m²] what slopes would seem to tell if they were noise alone, a share of what differs.
+def _noise_information(right: Floats, down: Floats, scaled: Floats, fraction: Floats) -> NDArray[np.float64]:
+    """(3, 3) [1/m²] what slopes would seem to tell if they were noise alone, a fraction of what differs.
 
     Ground without any texture would be measured with great confidence otherwise.
     """
     none = np.zeros_like(scaled)
     across = np.stack([-scaled, none, scaled * right], -1)
     upright = np.stack([none, -scaled, scaled * down], -1)
-    weighted = share[:, None]
+    weighted = fraction[:, None]
     return np.asarray((weighted * across).T @ across + (weighted * upright).T @ upright, np.float64)
 
 

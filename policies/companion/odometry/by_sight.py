@@ -101,8 +101,8 @@ class BySight:
         vehicle = self._vehicle
         if vehicle is None or self._fixed_us == NEVER_US:
             return
-        is_told = self._missed_us > self._fixed_us and time_us - self._fixed_us >= AWAY_US
-        if is_told or time_us - self._heard_us >= SILENT_US:
+        is_reported = self._missed_us > self._fixed_us and time_us - self._fixed_us >= AWAY_US
+        if is_reported or time_us - self._heard_us >= SILENT_US:
             self._missed_us = time_us
             if not self.is_away:
                 self.is_away, self._away_us, self.motion = True, own.boot_us, None
