@@ -34,10 +34,14 @@ def wilson_interval(successes: int, count: int) -> tuple[float, float]:
 
 def rate(is_success: NDArray[np.bool_]) -> Interval:
     """The fraction of true values with Wilson's interval; NaN of none."""
-    count = len(is_success)
+    return rate_of(int(is_success.sum()), len(is_success))
+
+
+def rate_of(successes: int, count: int) -> Interval:
+    """The same of counts."""
     if not count:
         return Interval(math.nan, math.nan, math.nan)
-    return Interval(float(is_success.mean()), *wilson_interval(int(is_success.sum()), count))
+    return Interval(successes / count, *wilson_interval(successes, count))
 
 
 def bootstrap(count: int, figure: Callable[[NDArray[np.int64]], float]) -> Interval:

@@ -18,7 +18,7 @@ from bench.cars.page import DOCS, write_page
 from bench.cars.result import Evaluated, Result, read, read_all, write, write_all
 from bench.judged_card import write_judged
 from bench.side_by_side import Job, run_side_by_side
-from common.intervals import Interval, wilson_interval
+from common.intervals import rate_of
 
 RESULTS = Path("results/cars")
 RUNS = DOCS / "cars.jsonl"
@@ -72,7 +72,7 @@ def _publish(there: dict[str, list[Result]]) -> None:
             continue
         seed, judged = best
         if (trained := RESULTS / f"{experiment.name}-{seed}.pt").exists():
-            found = Interval(judged.successes / judged.episodes, *wilson_interval(judged.successes, judged.episodes))
+            found = rate_of(judged.successes, judged.episodes)
             write_judged(trained, PRETRAINED / f"{experiment.name}.pt", "success", found, judged.episodes)
 
 

@@ -83,14 +83,8 @@ PARKING1 = Experiment(
     target=0.99,
     limit_s=120.0,
 )
-PARKING1_GAIL = Experiment(
-    "parking1-gail",
-    "Parking 1, PPO + GAIL",
-    "parking1-gail",
-    judged=(NEW_SPOTS, VALIDATION),
-    document="92 %, 12 h",
-    target=0.99,
-    limit_s=120.0,
+PARKING1_GAIL = replace(
+    PARKING1, name="parking1-gail", title="Parking 1, PPO + GAIL", recipe="parking1-gail", document="92 %, 12 h"
 )
 PARKING2 = Experiment(
     "parking2",

@@ -3,7 +3,7 @@
 In: images of the onboard camera, the phone's reports, telemetry. Out: a goal that moves with the owner, and how fast
 whoever goes there may be: it stays behind them, the farther the less is known of where they are. Who they are and where
 the guard's senses say, as those who follow by images have them. Neither seen nor heard of it searches: it goes to where
-they were last seen to go, and stands there until they are seen or it is the end.
+they were going when they were last seen or heard of, and stands there until they are seen or it is the end.
 """
 
 from math import hypot, nan
@@ -11,6 +11,7 @@ from math import hypot, nan
 import numpy as np
 
 from policies.companion.goals import Goal
+from policies.companion.guard.guard import GOES_ON_S, SHORT_OF_M
 from policies.companion.guard.limits import faded, stopping_speed
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
@@ -23,9 +24,7 @@ KEPT_M = 1.5  # on the level, from an owner whose place is known
 DEVIATIONS = 2.0  # that it keeps away farther, of the error of their place
 IMAGE_OLD_US = 300_000  # guess: three images missed; then it goes by the phone alone
 LOST = "owner lost"
-AHEAD_S = 4.0  # who is lost is looked for where they would be in so long; guess
-SHORT_OF_M = 2.0  # and no nearer to there than this; guess
-_BRAKE_M_S2 = 1.0  # before there
+_BRAKE_M_S2 = 1.0  # before where they are looked for
 
 
 class OwnerGoal:
@@ -89,7 +88,7 @@ class OwnerGoal:
     def goal(self) -> Goal | None:
         """Where the owner is, or is looked for; None: lost."""
         if self.is_searching and self._last is not None:
-            north, east = self._last.pos_ned[:2] + AHEAD_S * self._last.vel
+            north, east = self._last.pos_ned[:2] + GOES_ON_S * self._last.vel
             return Goal((float(north), float(east), nan), "where the owner was going")
         if self._owner is None or self._silence_s > self._settings.search_s:
             return None

@@ -16,6 +16,7 @@ from common.range_sectors import RangeLayout
 from policies.companion.guard.interventions import HEIGHT, NEAR_SOMETHING, TILTED, TOO_FAST, Interventions
 from policies.companion.guard.limits import (
     braking_speed,
+    capped,
     faded,
     is_tilted,
     stopping_speed,
@@ -121,17 +122,13 @@ class GoalGuard:
         scale, most = self._trust(age_s, dark_s)
         (velocity, yaw_rate) = wanted
         level = np.array(velocity[:2])
-        kept = self._capped(scale * level, most)
+        kept = capped(scale * level, min(most, self.settings.speed_max))
         self._count(TOO_FAST if self.stance is GoalStance.FREE else self.stance.value, level, kept)
         if self.stance is GoalStance.FREE and is_tilted(own.q_ned_from_frd, self.settings):
-            kept = np.zeros(2) if self._drives else self._capped(np.array(own.vel_ned[:2]))  # asks for no more tilt
+            as_it_goes = capped(np.array(own.vel_ned[:2]), self.settings.speed_max)  # asks for no more tilt
+            kept = np.zeros(2) if self._drives else as_it_goes
             self.interventions.note(TILTED)
         return self._bounded(kept, scale * velocity[2], yaw_rate, own, age_s)
-
-    def _capped(self, level: Floats, most: float = np.inf) -> Floats:
-        """A level velocity that is no faster than it ever may be, nor than this [m/s]."""
-        capped: Floats = level * min(1.0, min(most, self.settings.speed_max) / max(float(np.hypot(*level)), 1e-6))
-        return capped
 
     def begin(self, own: Own) -> None:
         """The policy takes over."""

@@ -23,7 +23,7 @@ from policies.companion.guard.interventions import (
     TILTED,
     Interventions,
 )
-from policies.companion.guard.limits import CLIMB_M_S, faded, is_tilted, stopping_speed, within_heights
+from policies.companion.guard.limits import CLIMB_M_S, capped, faded, is_tilted, stopping_speed, within_heights
 from policies.companion.guard.people import PeopleRule, Somebody
 from policies.companion.guard.rollouts import Rollouts
 from policies.companion.guard.settings import GuardSettings
@@ -38,8 +38,8 @@ _SEARCH_PERIOD_S = 24.0  # of a search towards the phone: at first it looks ther
 _SEARCH_FACES_S = 4.0  # then there from other sides, since trees may hide who is there,
 _SEARCH_ROUNDS_S = 13.0  # and then round itself
 _THERE_M = 2.0  # so near the stand-off it looks round
-_GOES_ON_S = 4.0  # an owner whom nobody hears is looked for where they would be in so long; guess
-_SHORT_OF_M = 2.0  # and no nearer to there than this; guess
+GOES_ON_S = 4.0  # an owner whom nobody hears is looked for where they would be in so long; guess
+SHORT_OF_M = 2.0  # and no nearer to there than this; guess
 _STAYS_M_S = 0.5  # as fast it goes back to where it stays
 _RISEN_US = 2_000_000  # for so long it stays over the owner
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
@@ -126,7 +126,7 @@ class Guard:
         let_be, people = self._past_people(self._by_sight(level), own)
         level = self._flown = self._past_solids(let_be, own, people)
         taken = let_be - level
-        self.goes_on_from = level + taken * min(1.0, _KEPT_M_S / max(float(np.hypot(*taken)), 1e-6))
+        self.goes_on_from = level + capped(taken, _KEPT_M_S)
         down = self._within_heights(down, own)
         return (float(level[0]), float(level[1]), float(down)), yaw_rate
 
@@ -136,7 +136,7 @@ class Guard:
             return level
         s = self.settings
         most = s.sight_speed * faded(self.vel_std, s.sight_slow_std, s.sight_stop_std)
-        slower = level * min(1.0, most / max(float(np.hypot(*level)), 1e-6))
+        slower = capped(level, most)
         self._count(NO_GNSS, level, slower)
         return slower
 
@@ -196,7 +196,7 @@ class Guard:
         if not has_seen or own.boot_us - self._search_us >= s.search_ahead_s * 1e6:
             return self._staying(own), down, s.search_yaw_rate
         way = self._likely_place() - np.array(own.pos_ned[:2])
-        return self._approaching(way, _SHORT_OF_M, s.search_ahead_speed), down, s.search_yaw_rate
+        return self._approaching(way, SHORT_OF_M, s.search_ahead_speed), down, s.search_yaw_rate
 
     def _approaching(self, way: Floats, short_of_m: float, speed_max: float) -> Floats:
         """The level velocity along a way that ends in a stand, so far short of its end."""
@@ -210,13 +210,13 @@ class Guard:
         if self._stays_ned is None:
             self._stays_ned = here
         off = self._stays_ned - here
-        return np.asarray(off * min(1.0, _STAYS_M_S / max(float(np.hypot(*off)), 1e-6)))
+        return capped(off, _STAYS_M_S)
 
     def _likely_place(self) -> Floats:
         """Where an owner whom nobody hears is looked for [m], north and east: as they were last seen to go."""
         seen = self.senses.seen
         place, velocity = seen.now(seen.time_us)
-        return np.asarray(place[:2] + _GOES_ON_S * velocity[:2])
+        return np.asarray(place[:2] + GOES_ON_S * velocity[:2])
 
     def _facing_owner(self, own: Own, yaw_rate: float) -> float:
         """Towards where sights and phone put an owner who is not seen; a yaw rate if nobody knows."""
@@ -245,7 +245,7 @@ class Guard:
         s, around = self.settings, self.senses.map
         slower = level
         if not around.has_depth:
-            slower = level * min(1.0, s.no_depth_speed / max(float(np.hypot(*level)), 1e-6))
+            slower = capped(level, s.no_depth_speed)
             self._count(NO_DEPTH, level, slower)
         kept = self._rollouts.clear_velocity(slower, self._flown, own, around, people)
         self._count(NEAR_SOMETHING, slower, kept)

@@ -14,6 +14,11 @@ SINK_M_S = 0.3  # from above what it may be
 _WAY_M, _STEP_M = 4.0, 0.02  # farther along an arc nothing is asked for
 
 
+def capped(level: Floats, most: float) -> Floats:
+    """A level velocity (2,) that is no faster than this [m/s]."""
+    return np.asarray(level * min(1.0, most / max(float(np.hypot(*level)), 1e-6)))
+
+
 def stopping_speed(free_m: float, delay_s: float, brake: float) -> float:
     """The speed [m/s] from which it stands within a way [m], after a delay [s], braking at so much [m/s²]."""
     if free_m <= 0.0:

@@ -14,6 +14,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.warp_start import start_warp
+from policies.companion.guard.limits import capped
 from policies.companion.guard.people import Somebody
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.local_map import Clearance, LocalMap
@@ -135,5 +136,5 @@ def _candidates(wanted: Floats, last: Floats, unseen_speed: float, *, is_too_nea
     creeping = min(unseen_speed / speed, 1.0)
     slower = np.concatenate([fraction * turned for fraction in (*_FRACTIONS, creeping)])
     away = unseen_speed * np.stack([cos, sin], -1)[: None if is_too_near else 0]
-    before = last * min(1.0, speed / max(float(np.hypot(*last)), 1e-6))
+    before = capped(last, speed)
     return np.concatenate([wanted[None], before[None], slower, away, np.zeros((1, 2))])

@@ -22,7 +22,6 @@ FIX_HZ = 5.0
 AWAY_US = 600_000  # so long told of no fix GNSS is away: three messages;
 SILENT_US = 3_000_000  # told nothing, after so long: some receivers tell once a second
 BACK_US = 6_000_000  # so long with one it is back: after 5 s of fixes that do not fit the estimate is set to them
-MOST_STD_M_S = 0.8  # who is surer of nothing has not measured
 SETTLED_US = 15_000_000  # and after so long the estimate has come to it: after 5 s of rejected fixes it is set
 DRIFT_M_S2 = 0.1  # a velocity that nobody measures goes off by so much: half a degree of tilt; guess
 INERTIAL_STD_M_S = 0.1  # when it was measured last
@@ -36,10 +35,11 @@ class BySight:
 
     Args:
         senses: who is where, and how the vehicle was held.
+        most_std: [m/s] a velocity known no better is not told.
     """
 
-    def __init__(self, senses: Senses) -> None:
-        self._senses = senses
+    def __init__(self, senses: Senses, most_std: float) -> None:
+        self._senses, self._most_std = senses, most_std
         self._odometry = VisualOdometry()
         self._vehicle: VehicleLink | None = None
         self._boot_us = 0  # the vehicle's clock
@@ -122,7 +122,7 @@ class BySight:
             return
         self._waiting = None
         motion = self._odometry.see(image.pixels, pose, self._people(own, pose), own.vel_ned)
-        if motion is not None and motion.std < MOST_STD_M_S and self._vehicle is not None:
+        if motion is not None and motion.std < self._most_std and self._vehicle is not None:
             if self.motion is None:
                 self._vehicle.say("Companion: no GNSS: by sight")
             self.motion = motion

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from common.attitude import Vector, rotated
 from policies.companion.odometry.alignment import align
 from policies.companion.odometry.view import View, view_of
-from policies.companion.senses.poses import Pose
+from policies.companion.senses.poses import Pose, matrix_of
 from policies.tasks.follow_me.observe import LENS_FRD, camera_mount
 
 Floats = NDArray[np.float64]
@@ -97,8 +97,8 @@ class VisualOdometry:
 
 def _taken(pixels: NDArray[np.uint8], pose: Pose, people: list[Floats]) -> _Taken:
     view = view_of(pixels)
-    mount = _matrix(camera_mount())
-    body = _matrix(pose.q_ned_from_frd)
+    mount = matrix_of(camera_mount())
+    body = matrix_of(pose.q_ned_from_frd)
     lens = np.array(rotated(pose.q_ned_from_frd, LENS_FRD))
     counts = np.ones(view.grey.shape, bool)
     if people:
@@ -108,8 +108,3 @@ def _taken(pixels: NDArray[np.uint8], pose: Pose, people: list[Floats]) -> _Take
             off = level - place[:2]
             counts &= np.hypot(off[..., 0], off[..., 1]) > _PERSON_M
     return _Taken(pose.time_us, pixels, view, body @ mount, lens, counts)
-
-
-def _matrix(q: tuple[float, float, float, float]) -> Floats:
-    """(3, 3) of a rotation."""
-    return np.array([rotated(q, axis) for axis in np.eye(3).tolist()]).T

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.attitude import Vector, rotated, yaw_of
-from policies.companion.senses.poses import Pose
+from policies.companion.senses.poses import Pose, matrix_of
 from policies.mono_depth.network import SeenDepth
 from policies.tasks.follow_me.observe import HFOV_DEG, IMAGE_SIZE, camera_mount, depth_of
 from policies.tasks.follow_me.tracked.vector import SECTORS
@@ -121,7 +121,7 @@ class LocalMap:
         byte = depth.astype(np.float64)
         is_return = byte < _NONE
         depth_m = depth_of(np.minimum(byte, _NONE - 1.0))
-        rotation = np.array([rotated(pose.q_ned_from_frd, axis) for axis in np.eye(3).tolist()]).T
+        rotation = matrix_of(pose.q_ned_from_frd)
         rays_ned = self._rays_frd @ rotation.T  # of depth 1
         points = rays_ned * depth_m[..., None]
         here = np.array(pose.pos_ned[:2])

@@ -5,7 +5,10 @@ from dataclasses import dataclass
 from itertools import islice
 from math import hypot, isfinite
 
-from common.attitude import Quat, Vector
+import numpy as np
+from numpy.typing import NDArray
+
+from common.attitude import Quat, Vector, rotated
 from policies.companion.vehicle_link import Own
 
 KEPT = 100  # of telemetry at 50 Hz: two seconds
@@ -43,6 +46,11 @@ class PoseHistory:
             if earlier.time_us <= time_us <= later.time_us:
                 return _between(earlier, later, (time_us - earlier.time_us) / (later.time_us - earlier.time_us))
         return None
+
+
+def matrix_of(q_dst_from_src: Quat) -> NDArray[np.float64]:
+    """The rotation as (3, 3)."""
+    return np.array([rotated(q_dst_from_src, axis) for axis in np.eye(3).tolist()]).T
 
 
 def _between(first: Pose, second: Pose, part: float) -> Pose:

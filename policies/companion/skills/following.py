@@ -89,7 +89,11 @@ class Following:
         self.guard = (
             Guard(guard, self._senses) if guard is not None and is_guarded and self._senses is not None else None
         )
-        self._sight = BySight(self._senses) if self.guard is not None and self._senses is not None else None
+        self._sight = (
+            BySight(self._senses, self.guard.settings.sight_stop_std)
+            if self.guard is not None and self._senses is not None
+            else None
+        )
         after = (guard.return_s, guard.resume_s) if guard is not None and is_guarded else (0.0, 0.0)
         self.return_s, self.resume_s = after
         self._watch = OwnerWatch(hears=hears) if self._senses is None else self._senses.watch

@@ -182,6 +182,14 @@ def seen_to_move(flight, seed, start):
     return external
 
 
+def gone_at_10_s(seed):
+    """A flight of 32 s whose GNSS goes away for good, the tick of that, and what odometry says from then on."""
+    flight = make_flight(seed=seed, duration_s=32.0)
+    away = 10 * TICKS
+    silence(flight.samples["gnss"], away)
+    return flight, away, seen_to_move(flight, seed, away)
+
+
 @pytest.fixture(scope="module")
 def seen_without_gnss():
     """Flights whose GNSS goes away at 12 s, for 30 s, and what comes of it: with odometry, and without."""
@@ -229,21 +237,16 @@ def test_without_velocity_from_outside_the_position_is_lost_as_before():
 
 
 def test_velocity_from_outside_carries_a_position_for_its_time_and_no_longer():
-    flight = make_flight(seed=1, duration_s=32.0)
-    away = 10 * TICKS
-    silence(flight.samples["gnss"], away)
+    flight, away, external = gone_at_10_s(1)
     ekf = default_ekf(EKF2_EV_CTRL=VEL, EKF2_EVV_TOUT=15.0)
-    flags = run(ekf, flight.samples, external=seen_to_move(flight, 1, away))[0]["estimate"]["flags"]
+    flags = run(ekf, flight.samples, external=external)[0]["estimate"]["flags"]
     assert flags[away + 14 * TICKS] & POSITION_VALID
     assert not flags[away + 16 * TICKS] & POSITION_VALID
     assert flags[away + 20 * TICKS] & VELOCITY_VALID
 
 
 def test_a_position_is_lost_soon_after_the_velocity_from_outside_ends():
-    flight = make_flight(seed=2, duration_s=32.0)
-    away = 10 * TICKS
-    silence(flight.samples["gnss"], away)
-    external = seen_to_move(flight, 2, away)
+    flight, away, external = gone_at_10_s(2)
     silence(external, away + 12 * TICKS)
     flags = run(default_ekf(EKF2_EV_CTRL=VEL), flight.samples, external=external)[0]["estimate"]["flags"]
     assert flags[away + 15 * TICKS] & POSITION_VALID
@@ -251,10 +254,7 @@ def test_a_position_is_lost_soon_after_the_velocity_from_outside_ends():
 
 
 def test_a_velocity_that_says_next_to_nothing_carries_no_position():
-    flight = make_flight(seed=1, duration_s=32.0)
-    away = 10 * TICKS
-    silence(flight.samples["gnss"], away)
-    external = seen_to_move(flight, 1, away)
+    flight, away, external = gone_at_10_s(1)
     external["vel_std"] = 30.0
     flags = run(default_ekf(EKF2_EV_CTRL=VEL), flight.samples, external=external)[0]["estimate"]["flags"]
     assert not flags[away + 20 * TICKS] & POSITION_VALID

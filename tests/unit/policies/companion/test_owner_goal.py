@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from common.image_stream import ImageFrame
+from policies.companion.guard.guard import GOES_ON_S, SHORT_OF_M
 from policies.companion.guard.settings import GuardSettings
-from policies.companion.owner_goal import AHEAD_S, KEPT_M, SHORT_OF_M, OwnerGoal
+from policies.companion.owner_goal import KEPT_M, OwnerGoal
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import Own, Owner
 from policies.person_detector.detector import Detection
@@ -155,7 +156,7 @@ def test_who_is_neither_seen_nor_heard_of_is_waited_for_and_then_looked_for_wher
     scene.pass_by(GUARD.search_s - GUARD.stop_s, pixels=BLANK)
     assert scene.texts == ["Companion: searching the owner"]
     north, east = scene.goal.goal.pos_ned[:2]
-    assert (north, east) == pytest.approx((last_m + AHEAD_S, 0.0), abs=1.0)
+    assert (north, east) == pytest.approx((last_m + GOES_ON_S, 0.0), abs=1.0)
     assert 0.5 < scene.goal.speed_max_m_s <= GUARD.search_ahead_speed
     scene.vehicle.own.pos_ned = (north - SHORT_OF_M, east, 0.0)
     assert scene.goal.speed_max_m_s == 0.0

@@ -32,7 +32,7 @@ class Bench:
         self.end, companion_end = memory_pair()
         self.link = VehicleLink(companion_end)
         self.senses = Senses(detector=Blind())  # type: ignore[arg-type]
-        self.sight = BySight(self.senses)
+        self.sight = BySight(self.senses, 0.8)
         self.sight.attach(self.link)
         self.us, self.reader, self.sent = 0, FrameReader(), []  # type: ignore[var-annotated]
         self.tell("HEARTBEAT", autopilot=int(PX4.autopilot), base_mode=128)
