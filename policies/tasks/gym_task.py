@@ -2,8 +2,8 @@
 
 In: actions in the task's buffers. Out: what a vector environment of Gymnasium makes of them, written where the kernels
 of other tasks write theirs. Episodes are begun here (`AutoresetMode.DISABLED` with `reset_mask`), so that what they saw
-last is kept; or by a vector environment itself (`NEXT_STEP`), whose steps in between are skipped. An environment's own
-state cannot be saved: a run that is resumed begins its episodes anew.
+last is kept; or by a vector environment itself, which tells that apart (`SAME_STEP`) or takes a step in between that is
+skipped (`NEXT_STEP`). An environment's own state cannot be saved: a run that is resumed begins its episodes anew.
 """
 
 import ast
@@ -19,7 +19,7 @@ from pydantic import ConfigDict, model_validator
 
 from policies.tasks.catalogue import GYM, UnknownTask, import_users_module
 from policies.tasks.episode import Outcome
-from policies.tasks.gym_next_step import NextStepRows
+from policies.tasks.gym_autoreset import AutoresetRows, final_observations
 from policies.tasks.gym_spaces import ActionWriter, ObservationReader, UnfitSpace
 from policies.tasks.layout import Layout
 from policies.tasks.reshaping import Rows
@@ -91,13 +91,16 @@ class GymTask(Task):
         )
         super().__init__(layout, env_count, number_defaults={}, device=device)
         self._seeds: list[int | None] = [None] * env_count
-        is_next_step = self.envs.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
-        self._between = NextStepRows(env_count) if is_next_step else None
+        mode = self.envs.metadata["autoreset_mode"]
+        is_same_step = mode is AutoresetMode.SAME_STEP
+        self._autoreset = (
+            None if mode is AutoresetMode.DISABLED else AutoresetRows(env_count, is_same_step=is_same_step)
+        )
 
     @property
     def is_skipped(self) -> NDArray[np.bool_] | None:
         """Where the last step was no decision: of environments that begin episodes by themselves."""
-        return None if self._between is None else self._between.is_skipped
+        return None if self._autoreset is None else self._autoreset.is_skipped
 
     def reset(self, seed: int | Sequence[int], is_chosen: NDArray[np.bool_] | None = None) -> None:
         """Starts environments anew; of a single seed each has the next one."""
@@ -118,14 +121,21 @@ class GymTask(Task):
         observations, rewards, *ends, info = self.envs.step(actions)
         is_terminated, is_truncated = (np.asarray(end, dtype=np.bool_) for end in ends)
         is_decided = np.ones(self.env_count, dtype=np.bool_)
-        if self._between is not None:
-            is_begun = self._between.step(is_terminated | is_truncated)
-            is_decided = ~self._between.is_skipped
-            self._clear(rows, is_begun)
+        is_begun = ~is_decided  # in this step, by themselves
+        if self._autoreset is not None:
+            is_begun = self._autoreset.step(is_terminated | is_truncated)
+            is_decided = ~self._autoreset.is_skipped
+        is_same_step = self._autoreset is not None and self._autoreset.is_same_step and bool(is_begun.any())
         rows.of("rewards")[:] = np.where(is_decided, rewards, 0.0)
+        if is_same_step:
+            self._show(rows, ~is_begun, observations)
+            self._show(rows, is_begun & is_decided, self._seen_last(info, is_begun))
+            info = {**info, **info["final_info"]} if isinstance(info.get("final_info"), Mapping) else info
+        else:
+            self._clear(rows, is_begun)
+            self._show(rows, np.ones_like(is_decided), observations)
         rows.of("returns")[:] += rows.of("rewards")
         rows.of("steps")[:] += is_decided
-        self._show(rows, np.ones_like(is_decided), observations)
         outcomes = self._outcomes(is_terminated, is_truncated, info)
         for name in ("outcomes", "is_terminated", "is_truncated"):
             rows.of(name)[:] = 0
@@ -134,11 +144,20 @@ class GymTask(Task):
             rows.end(is_over, outcomes)
             rows.of("is_terminated")[:] = is_terminated & is_over
             rows.of("is_truncated")[:] = is_truncated & ~is_terminated & is_over
-            if self._between is None:
+            if self._autoreset is None:
                 self._begin_rows(rows, is_over)
             else:
                 self._close(rows, is_over)
+        if is_same_step:
+            self._clear(rows, is_begun)
+            self._show(rows, is_begun, observations)
         rows.write()
+
+    def _seen_last(self, info: Mapping[str, Any], is_over: NDArray[np.bool_]) -> Any:
+        try:
+            return final_observations(self.envs.single_observation_space, info, is_over)
+        except ValueError as error:
+            raise ValueError(f"{self.layout.task}: {error}") from None
 
     def _outcomes(self, is_terminated: Any, is_truncated: Any, info: Mapping[str, Any]) -> NDArray[np.int32]:
         """How each episode stands, shape (envs,)."""
@@ -153,16 +172,16 @@ class GymTask(Task):
     def _begin_rows(self, rows: Rows, is_chosen: NDArray[np.bool_]) -> None:
         if not is_chosen.any():
             return
-        if self._between is None:
+        if self._autoreset is None:
             seeds = [seed if chosen else None for seed, chosen in zip(self._seeds, is_chosen, strict=True)]
             self._seeds = [None if chosen else seed for seed, chosen in zip(self._seeds, is_chosen, strict=True)]
             observations = self._reset_some(seeds, is_chosen)
-        elif not is_chosen.all() and self._between.leave(is_chosen):  # it has no way to reset some
+        elif not is_chosen.all() and self._autoreset.leave(is_chosen):  # it has no way to reset some
             self._close(rows, is_chosen)
             return
         else:
             is_chosen = np.ones_like(is_chosen)
-            self._between.restart()
+            self._autoreset.restart()
             observations, _ = self.envs.reset(seed=self._seeds[0])
             self._seeds = [None] * self.env_count
         self._clear(rows, is_chosen)
@@ -256,10 +275,10 @@ def _made(spec: EnvSpec, env_count: int, settings: GymSettings) -> VectorEnv[Any
     if is_vector:
         made = _called(name, lambda: gymnasium.make_vec(spec, env_count, "vector_entry_point", **arguments))
         envs: VectorEnv[Any, Any, Any] = made
-        if envs.metadata.get("autoreset_mode") not in (AutoresetMode.DISABLED, AutoresetMode.NEXT_STEP):
+        if not isinstance(envs.metadata.get("autoreset_mode"), AutoresetMode):
             raise UnknownTask(
-                f"{name}: is a vector environment that begins episodes by itself in the step that ends one, or says "
-                "nothing of it; autoreset_mode NextStep or Disabled is needed"
+                f"{name}: is a vector environment that does not say when it begins episodes: its metadata need an "
+                "autoreset_mode"
             )
         return envs
     makers = [lambda: gymnasium.make(spec, **arguments)] * env_count

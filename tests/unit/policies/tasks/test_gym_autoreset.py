@@ -1,9 +1,10 @@
-"""Vector environments that begin episodes by themselves with the next step, held against Gymnasium's single ones."""
+"""Vector environments that begin episodes by themselves, held against Gymnasium's single ones."""
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.envs.classic_control.cartpole import CartPoleVectorEnv
+from gymnasium.spaces import Box, Dict, Discrete
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 from policies.experts.episode_recording import Recorder
@@ -15,18 +16,24 @@ from policies.tasks.gym_task import GymTask
 ENVS = 4
 
 
-def several(env_id):
-    """A vector entry point: Gymnasium's own batch of single environments, as it begins episodes by default."""
-    return lambda num_envs, **settings: SyncVectorEnv([lambda: gymnasium.make(env_id, **settings)] * num_envs)
+MODES = {"Several": AutoresetMode.NEXT_STEP, "SameStep": AutoresetMode.SAME_STEP}
+
+
+def several(env_id, mode):
+    """A vector entry point: Gymnasium's own batch of single environments."""
+    return lambda num_envs, **settings: SyncVectorEnv(
+        [lambda: gymnasium.make(env_id, **settings)] * num_envs, autoreset_mode=mode
+    )
 
 
 @pytest.fixture(autouse=True)
 def registered():
-    for env_id in ("CartPole-v1", "Pendulum-v1"):
-        gymnasium.register(f"Several{env_id}", vector_entry_point=several(env_id))
+    names = [(kind, env_id) for kind in MODES for env_id in ("CartPole-v1", "Pendulum-v1")]
+    for kind, env_id in names:
+        gymnasium.register(f"{kind}{env_id}", vector_entry_point=several(env_id, MODES[kind]))
     yield
-    for env_id in ("CartPole-v1", "Pendulum-v1"):
-        gymnasium.registry.pop(f"Several{env_id}")
+    for kind, env_id in names:
+        gymnasium.registry.pop(f"{kind}{env_id}")
 
 
 def lean(task):
@@ -51,10 +58,11 @@ def episodes_of(task, count):
     return [row[:count] for row in found]
 
 
+@pytest.mark.parametrize("kind", MODES)
 @pytest.mark.parametrize(("env_id", "stack"), [("CartPole-v1", 0), ("CartPole-v1", 3), ("Pendulum-v1", 0)])
-def test_episodes_are_those_of_environments_that_are_reset(env_id, stack):
+def test_episodes_are_those_of_environments_that_are_reset(env_id, stack, kind):
     """Each decision of each row, bit for bit: nothing of the steps in between is in them."""
-    names = (f"gym:{env_id}", f"gym:Several{env_id}")
+    names = (f"gym:{env_id}", f"gym:{kind}{env_id}")
     single, several = (build_task(name, ENVS, settings_of(name, [f"stack={stack}"])) for name in names)
     assert single.is_skipped is None
     for own, theirs in zip(episodes_of(several, 4), episodes_of(single, 4), strict=True):
@@ -95,9 +103,10 @@ def test_returns_and_lengths_are_those_of_gymnasiums_vector_environment():
     assert scores.return_sum + buffers.returns.numpy().sum() == reward_sum == decisions
 
 
-def test_an_episode_that_the_task_ends_waits_for_the_environments_own_end():
+@pytest.mark.parametrize("kind", MODES)
+def test_an_episode_that_the_task_ends_waits_for_the_environments_own_end(kind):
     class Tilted(GymTask):
-        env_id = "SeveralCartPole-v1"
+        env_id = f"{kind}CartPole-v1"
 
         def outcome(self, decision):
             return np.where(np.abs(decision.next_observations[:, 2]) > 0.1, Outcome.FELL, decision.outcomes)
@@ -117,8 +126,9 @@ def test_an_episode_that_the_task_ends_waits_for_the_environments_own_end():
     assert scores.return_sum == 2.0 * scores.length_sum
 
 
-def test_rows_that_all_wait_are_reset_together():
-    task = build_task("gym:SeveralCartPole-v1", 2)
+@pytest.mark.parametrize("kind", MODES)
+def test_rows_that_all_wait_are_reset_together(kind):
+    task = build_task(f"gym:{kind}CartPole-v1", 2)
     task.reset(1)
     lean(task)
     task.step()
@@ -144,6 +154,96 @@ def test_the_seed_is_what_the_episodes_depend_on():
 def test_what_begins_by_itself_is_no_environment_of_ours():
     with pytest.raises(UnknownTask, match=r"gym:SeveralCartPole-v1: begins episodes by itself: take it from gym"):
         TaskVectorEnv("gym:SeveralCartPole-v1", 2)
+
+
+@pytest.fixture
+def batch():
+    gymnasium.register("Batch-v0", vector_entry_point="policies.tasks.gym:TaskVectorEnv", kwargs={"task": "RollerBall"})
+    yield "gym:Batch-v0"
+    gymnasium.registry.pop("Batch-v0")
+
+
+def test_a_batch_of_ours_that_begins_episodes_in_the_same_step_is_the_task_itself(batch):
+    """What each episode saw last too, which `final_obs` tells as a batch."""
+    task, own = build_task(batch, 8), build_task("RollerBall", 8)
+    assert task.envs.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    task.reset(1)
+    own.load_state(task.envs.task.state())
+    rng, ends = np.random.default_rng(2), 0
+    for _ in range(200):
+        actions = rng.uniform(-1.0, 1.0, (8, 2)).astype(np.float32)
+        for each in (task, own):
+            each.buffers.continuous.assign(actions)
+            each.step()
+        for name in ("observations", "rewards", "final_observations", "is_terminated", "is_truncated", "steps"):
+            theirs = getattr(own.buffers, name).numpy()
+            assert np.allclose(getattr(task.buffers, name).numpy(), theirs, atol=1e-4), name  # actions are rounded
+        ends += int((own.buffers.outcomes.numpy() != Outcome.RUNNING).sum())
+    assert task.take_scores().episode_count == ends > 3
+
+
+class Door(gymnasium.Env):
+    """Ends after three decisions, now with success, now without; what is seen are a place and a picture."""
+
+    observation_space = Dict({"at": Box(-9, 9, (2,)), "picture": Box(0, 255, (12, 10, 3), np.uint8)})
+    action_space = Discrete(2)
+    episodes = 0
+
+    def _seen(self):
+        return {"at": np.full(2, self.at, np.float32), "picture": np.full((12, 10, 3), self.at, np.uint8)}
+
+    def reset(self, *, seed=None, options=None):  # noqa: ARG002  (as Gymnasium calls it)
+        super().reset(seed=seed)
+        self.at, self.episodes = 0, self.episodes + 1
+        return self._seen(), {}
+
+    def step(self, action):  # noqa: ARG002
+        self.at += 1
+        return self._seen(), 1.0, self.at == 3, False, {"is_success": self.at == 3 and self.episodes == 2}
+
+
+def test_dicts_pictures_and_success_of_the_same_step_are_understood():
+    gymnasium.register(
+        "Doors-v0",
+        vector_entry_point=lambda num_envs: SyncVectorEnv([Door] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP),
+    )
+    try:
+        task = build_task("gym:Doors-v0", 2)
+        task.reset(1)
+        outcomes = []
+        for _ in range(6):
+            task.step()
+            outcomes.append(Outcome(int(task.buffers.outcomes.numpy()[0])))
+        running = [Outcome.RUNNING] * 2
+        assert outcomes == [*running, Outcome.ENDED, *running, Outcome.SUCCESS]
+        assert (task.buffers.final_observations.numpy() == 3.0).all()
+        assert (task.buffers.final_images.numpy() == 3).all()
+        assert not task.buffers.images.numpy().any()
+        assert task.says_success
+    finally:
+        gymnasium.registry.pop("Doors-v0")
+
+
+def test_who_does_not_tell_what_was_seen_last_is_refused_at_the_first_end():
+    class Silent(SyncVectorEnv):
+        def step(self, actions):
+            *seen, info = super().step(actions)
+            return *seen, {key: value for key, value in info.items() if "final_obs" not in key}
+
+    gymnasium.register(
+        "Silent-v0",
+        vector_entry_point=lambda num_envs: Silent(
+            [lambda: gymnasium.make("CartPole-v1")] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP
+        ),
+    )
+    try:
+        task = build_task("gym:Silent-v0", 2)
+        task.reset(1)
+        with pytest.raises(ValueError, match=r"^gym:Silent-v0: an episode has ended, and info tells no final_obs"):
+            for _ in range(200):
+                task.step()
+    finally:
+        gymnasium.registry.pop("Silent-v0")
 
 
 class OneSeed(VectorEnv):
