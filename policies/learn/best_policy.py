@@ -20,12 +20,19 @@ class BestPolicy:
     def __init__(self) -> None:
         self.judged: Evaluation | None = None
         """The judgement of the best."""
-        self._worth = -math.inf
+        self._worth = (False, -math.inf)
         self._record: dict[str, Any] = {}
         self._card: dict[str, Any] = {}
 
-    def offer(self, policy: Policy, card: PolicyCard, judged: Evaluation, worth: float) -> None:
-        """Keeps a copy if none was worth as much; of equals the later, which learned longer."""
+    def offer(self, policy: Policy, card: PolicyCard, judged: Evaluation, worth: tuple[bool, float]) -> None:
+        """Keeps a copy if none was worth as much; of equals the later, which learned longer.
+
+        Args:
+            policy: that was judged.
+            card: its.
+            judged: what it came to.
+            worth: `Evaluation.worth`, or something else that is compared so.
+        """
         if worth >= self._worth:
             self.judged, self._worth = judged, worth
             self._record = copy.deepcopy(policy_record(policy))
@@ -44,5 +51,4 @@ class BestPolicy:
         """Restores what `state` returned."""
         self.judged = Evaluation(**state["judged"]) if state["judged"] is not None else None
         self._record, self._card = state["policy"], state["card"]
-        rate = self.judged.success_rate if self.judged is not None else -math.inf
-        self._worth = state.get("worth", rate)  # not in checkpoints of before evaluations counted
+        self._worth = state["worth"]

@@ -42,9 +42,9 @@ class Evaluation:
         return self.outcomes["success"] / self.episodes
 
     @property
-    def worth(self) -> float:
-        """What policies are compared by: the success rate, or the mean return of a task that says of none."""
-        return self.success_rate if self.says_success else self.mean_return
+    def worth(self) -> tuple[bool, float]:
+        """What policies are compared by: the success rate, or, below all of these, the mean return."""
+        return self.says_success, self.success_rate if self.says_success else self.mean_return
 
     @property
     def interval(self) -> tuple[float, float]:

@@ -191,7 +191,7 @@ class Training:
                 self.recent.clear()
             self.recent.add(iteration.scores)
             if evaluation is not None and self.behavior.keep_best and self._target is None:
-                self._best.offer(self.learner.policy, self._card(), evaluation, evaluation.mean_return)
+                self._best.offer(self.learner.policy, self._card(), evaluation, (False, evaluation.mean_return))
             self._moments.append((wall_time_s(), steps))
             self.watcher.show(self._progress())
             self._advance(iteration.scores)

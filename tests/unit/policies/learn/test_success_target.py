@@ -1,5 +1,7 @@
 """A training stops early by episodes of its own split, and these are not played before they are worth it."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 from pydantic import TypeAdapter
@@ -61,3 +63,11 @@ def test_target_is_reached_when_the_lower_end_of_the_interval_reaches_it():
 
     assert not TARGET.is_reached(judged(905))
     assert TARGET.is_reached(judged(930))
+
+
+def test_policies_of_which_some_succeed_are_worth_more_than_any_return():
+    """Of an environment that says of success no sooner than somebody does."""
+    silent = Evaluation({"success": 0, "timeout": 100}, mean_return=400.0, mean_length=10.0, says_success=False)
+    better = replace(silent, mean_return=401.0)
+    succeeds = replace(silent, outcomes={"success": 1, "timeout": 99}, mean_return=-5.0, says_success=True)
+    assert silent.worth < better.worth < succeeds.worth
