@@ -7,11 +7,13 @@ better. What the vehicle makes of it is the vehicle's (EKF2_EV_CTRL); one that d
 ever.
 """
 
+from collections import deque
 from typing import Any
 
 import numpy as np
 
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT
+from common.attitude import Vector
 from common.image_stream import ImageFrame
 from policies.companion.odometry.visual_odometry import Motion, VisualOdometry
 from policies.companion.senses.poses import Pose
@@ -28,6 +30,7 @@ INERTIAL_STD_M_S = 0.1  # when it was measured last
 _FIX_3D = 3  # GPS_FIX_TYPE
 _ALIKE = 9.0  # measurements in a row err alike, and count as one: the estimator takes each for one of its own
 _WAIT_US = 200_000  # for the attitude of a picture; it comes with the next telemetry
+_KEPT = 50  # velocities at 50 Hz: a second, by which no picture is late that is worth looking at
 
 
 class BySight:
@@ -47,6 +50,7 @@ class BySight:
         self._fixed_us = NEVER_US  # the last fix, likewise
         self._missed_us = NEVER_US  # when there was none last
         self._waiting: ImageFrame | None = None  # for its attitude
+        self._flown: deque[tuple[int, Vector]] = deque(maxlen=_KEPT)  # how fast the vehicle took itself to go
         self.is_away = False
         """GNSS is, and was there before."""
         self._away_us = NEVER_US  # since when, on the vehicle's clock
@@ -80,6 +84,9 @@ class BySight:
         if own.boot_us < self._boot_us:  # it has restarted: what was measured was at no time that it knows
             self._fixed_us, self.is_away, self.motion, self._waiting = NEVER_US, False, None, None
             self._odometry.forget()
+            self._flown.clear()
+        if own.boot_us != self._boot_us and np.isfinite(own.vel_ned).all():
+            self._flown.append((own.boot_us, own.vel_ned))
         self._boot_us = own.boot_us
         self._judge(own, time_us)
         if image is not None:
@@ -126,7 +133,7 @@ class BySight:
             if self.motion is None:
                 self._vehicle.say("Companion: no GNSS: by sight")
             self.motion = motion
-            self._send(self._vehicle, motion)
+            self._send(self._vehicle, motion, own)
 
     def _people(self, own: Own, pose: Pose) -> list[np.ndarray[Any, np.dtype[np.float64]]]:
         """Where everybody was then who may be in the picture."""
@@ -134,11 +141,20 @@ class BySight:
         others = [person.pos_ned for person in self._senses.others_now(own)]
         return [seen.now(pose.time_us)[0], *others] if seen.sights else others
 
-    def _send(self, vehicle: VehicleLink, motion: Motion) -> None:
-        north, east, down = (float(x) for x in motion.vel_ned)
+    def _send(self, vehicle: VehicleLink, motion: Motion, own: Own) -> None:
+        """Tells a velocity as of now, by how much faster the vehicle says that it has become since the pictures.
+
+        What is older than an estimator can remember it takes for how fast it goes now.
+        """
+        time_us, vel_ned = motion.time_us, motion.vel_ned
+        if self._flown and self._flown[0][0] <= time_us:
+            times_us = [moment_us for moment_us, _ in self._flown]
+            then = [np.interp(time_us, times_us, axis) for axis in zip(*(vel for _, vel in self._flown), strict=True)]
+            time_us, vel_ned = own.boot_us, vel_ned + np.array(self._flown[-1][1]) - np.array(then)
+        north, east, down = (float(x) for x in vel_ned)
         vehicle.send(
             "VISION_SPEED_ESTIMATE",
-            usec=motion.time_us,
+            usec=time_us,
             x=north,
             y=east,
             z=down,

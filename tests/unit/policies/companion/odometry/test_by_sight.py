@@ -35,6 +35,8 @@ class Bench:
         self.sight = BySight(self.senses, 0.8)
         self.sight.attach(self.link)
         self.us, self.reader, self.sent = 0, FrameReader(), []  # type: ignore[var-annotated]
+        self.late_us = 40_000  # pictures
+        self.north_m_s = lambda us: 0.0  # noqa: ARG005  (as the vehicle takes itself to go)
         self.tell("HEARTBEAT", autopilot=int(PX4.autopilot), base_mode=128)
         rng = np.random.default_rng(1)
         self.ground = np.kron(rng.integers(40, 215, (16, 16, 3)), np.ones((4, 4, 1))).astype(np.uint8)
@@ -53,7 +55,7 @@ class Bench:
         for _ in range(round(seconds * 1e6 / STEP_US)):
             self.us += STEP_US
             self.tell("ATTITUDE_QUATERNION", time_boot_ms=self.us // 1000, q1=1.0)
-            self.tell("LOCAL_POSITION_NED", time_boot_ms=self.us // 1000, z=-2.0)
+            self.tell("LOCAL_POSITION_NED", time_boot_ms=self.us // 1000, z=-2.0, vx=self.north_m_s(self.us))
             if fix is not None and self.us % 200_000 == 0:
                 self.tell("GPS_RAW_INT", fix_type=fix)
             self.link.receive(self.us)
@@ -64,11 +66,11 @@ class Bench:
                 self.sent += [decode(frame) for frame in self.reader.feed(data)]
 
     def image(self) -> ImageFrame:
-        """Taken 40 ms ago, from a lens 2 m before a wall, noise on it."""
+        """Taken a while ago, from a lens 2 m before a wall, noise on it."""
         pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 85, np.uint8)
         noise = np.random.default_rng(self.us).integers(-3, 4, self.ground.shape)
         pixels[..., :3] = np.clip(self.ground.astype(int) + noise, 0, 255)
-        return ImageFrame(self.us - 40_000, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
+        return ImageFrame(self.us - self.late_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
 
     def named(self, name: str) -> list[object]:
         return [message.fields for message in self.sent if message.name == name]
@@ -110,8 +112,24 @@ def test_without_a_fix_it_tells_ten_times_a_second_how_fast_it_goes(
         assert fields.covariance[0] > 0.1**2  # type: ignore[attr-defined]
     stamps = [fields.usec for fields in told]  # type: ignore[attr-defined]
     assert all(after - before == 100_000 for before, after in pairwise(stamps))
-    assert stamps[-1] == bench.us - 190_000  # between the two pictures that came before the newest
+    assert stamps[-1] == bench.us - 80_000  # as of when the picture before the newest was looked at
     assert bench.texts == ["Companion: no GNSS: by sight"]
+
+
+def test_what_late_pictures_show_is_told_as_of_now(bench: Bench) -> None:
+    """The wall says 0 m/s of the middle between two pictures; since then the vehicle has gone faster or slower."""
+    bench.run(1.0, 3)
+    bench.late_us = 300_000
+    bench.north_m_s = lambda us: 0.5 * abs(us * 1e-6 % 1.0 - 0.5)  # to and fro with 0.5 m/s²
+    bench.run(6.0, 0)
+    told = bench.named("VISION_SPEED_ESTIMATE")
+    assert len(told) > 30
+    gained = []
+    for fields in told[5:]:
+        taken_us = fields.usec - 20_000 - bench.late_us - 50_000  # type: ignore[attr-defined]
+        gained.append(bench.north_m_s(fields.usec) - bench.north_m_s(taken_us))  # type: ignore[attr-defined]
+    assert max(gained) > 0.15
+    assert [fields.x for fields in told[5:]] == pytest.approx(gained, abs=0.1)  # type: ignore[attr-defined]
 
 
 def test_it_stops_when_gnss_is_back_for_a_while_and_says_so(bench: Bench) -> None:
