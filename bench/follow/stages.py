@@ -55,6 +55,7 @@ STAGES: dict[str, Stage] = {
             "follow-me",
             teacher="teacher",
             flies=True,
+            ships=False,
             document="reward 20 to 30, not ready for use, 36.4 h",
             limit_s=1800.0,
             targets=(0.98, 0.85),
@@ -74,7 +75,6 @@ STAGES: dict[str, Stage] = {
             teacher="teacher",
             start="student",
             flies=True,
-            ships=False,
             limit_s=3600.0,
         ),
         Stage(
@@ -83,6 +83,7 @@ STAGES: dict[str, Stage] = {
             "follow-me-vision",
             teacher="teacher",
             flies=True,
+            ships=False,
             document="best published drone tracking success: about 72 % (GC-VAT)",
             figure="success",
             targets=(0.85, None),

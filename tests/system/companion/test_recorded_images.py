@@ -20,7 +20,7 @@ CAMERA = ("--env-args", "observation=camera")
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("camera") / "run"
-    return folder, flown(folder, "follow-me")
+    return folder, flown(folder, "follow-me-late")
 
 
 def built(source, out, *words):

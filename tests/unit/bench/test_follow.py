@@ -82,28 +82,28 @@ def test_policies_that_ship_stay_unless_new_ones_are_published(tmp_path):
     results, ships = tmp_path / "results", tmp_path / "pretrained"
     results.mkdir()
     ships.mkdir()
-    old, new, same = (shipped(name) for name in ("follow-me-teacher", "follow-me", "follow-me-vision"))
-    (ships / "follow-me.pt").write_bytes(old)
-    (ships / "follow-me-vision.pt").write_bytes(same)
-    made = {"student-1": new, "vision-only-1": same, "tuned-1": old}
+    old, new, same = (shipped(name) for name in ("follow-me-late", "follow-me-tracked", "follow-me-teacher"))
+    (ships / "follow-me-tracked.pt").write_bytes(old)
+    (ships / "follow-me-teacher.pt").write_bytes(same)
+    made = {"tracked-1": new, "teacher-1": same, "tuned-1": old}
     for name, content in made.items():
         (results / f"{name}.pt").write_bytes(content)
     (line,) = unpublished(results, ships)
-    assert line == f"{results / 'student-1.pt'}: not follow-me.pt, which still ships: --publish"
-    assert (ships / "follow-me.pt").read_bytes() == old
+    assert line == f"{results / 'tracked-1.pt'}: not follow-me-tracked.pt, which still ships: --publish"
+    assert (ships / "follow-me-tracked.pt").read_bytes() == old
     assert len(published(results, ships)) == 1
-    assert (ships / "follow-me.pt").read_bytes() == new
-    assert {path.name for path in ships.iterdir()} == {"follow-me.pt", "follow-me-vision.pt"}
+    assert (ships / "follow-me-tracked.pt").read_bytes() == new
+    assert {path.name for path in ships.iterdir()} == {"follow-me-tracked.pt", "follow-me-teacher.pt"}
     assert not unpublished(results, ships)
 
 
 def test_of_several_seeds_the_chosen_is_published_whichever_shipped_and_says_what_it_was_chosen_by(tmp_path):
     ships = tmp_path / "pretrained"
     ships.mkdir()
-    (tmp_path / "vision-only-1.pt").write_bytes(shipped("follow-me-vision"))
-    (tmp_path / "vision-only-2.pt").write_bytes(shipped("follow-me-tracked"))
+    (tmp_path / "late-1.pt").write_bytes(shipped("follow-me-late"))
+    (tmp_path / "late-2.pt").write_bytes(shipped("follow-me-tracked"))
     (tmp_path / "tracked-student-1.pt").write_bytes(shipped("follow-me-teacher"))  # of a stage that does not ship
-    (ships / "follow-me-vision.pt").write_bytes(shipped("follow-me-vision"))
+    (ships / "follow-me-late.pt").write_bytes(shipped("follow-me-late"))
     asked = []
 
     def second(paths, figure):
@@ -111,9 +111,9 @@ def test_of_several_seeds_the_chosen_is_published_whichever_shipped_and_says_wha
         return paths[1], Interval(0.8, 0.7, 0.9)
 
     assert len(published(tmp_path, ships, second)) == 1
-    assert asked == [(["vision-only-1.pt", "vision-only-2.pt"], "success")]
-    _, card = load_policy(ships / "follow-me-vision.pt")
-    assert (card.figures["success_low"], card.figures["success_high"]) == (0.7, 0.9)
+    assert asked == [(["late-1.pt", "late-2.pt"], "in_band")]
+    _, card = load_policy(ships / "follow-me-late.pt")
+    assert (card.figures["band_low"], card.figures["band_high"]) == (0.7, 0.9)
     assert not unpublished(tmp_path, ships)  # the card differs, the policy does not
 
 

@@ -18,7 +18,6 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.names import FOLLOWER
 from policies.companion.pilot import PilotError
 from policies.datasets.reader import DatasetReader
-from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.follow_me.follow_me_params import FOLLOW_PARAMS
 from policies.tasks.follow_me.observe import EGO, TRACKED
 
@@ -250,8 +249,8 @@ def test_an_exported_policy_of_something_else_is_refused_in_a_sentence(tmp_path,
 
 def test_an_exported_policy_chooses_what_the_policy_itself_does(tmp_path):
     """By onnxruntime, with its memory, over some seconds of images that differ."""
-    exported = exported_to(tmp_path / "policy.onnx", pretrained("FollowMe"))
-    own, theirs = any_pilot("follow-me"), any_pilot(exported)
+    exported = exported_to(tmp_path / "policy.onnx", "follow-me-late")
+    own, theirs = any_pilot("follow-me-late"), any_pilot(exported)
     rng = np.random.default_rng(1)
     for _ in range(20):
         vector = rng.normal(0.0, 0.5, 21).astype(np.float32)
