@@ -51,4 +51,6 @@ class BestPolicy:
         """Restores what `state` returned."""
         self.judged = Evaluation(**state["judged"]) if state["judged"] is not None else None
         self._record, self._card = state["policy"], state["card"]
-        self._worth = state["worth"]
+        worth = state.get("worth")  # checkpoints of before held a number, or nothing
+        known = self.judged.worth if self.judged is not None else (False, -math.inf)
+        self._worth = worth if isinstance(worth, tuple) else known

@@ -43,8 +43,9 @@ class Evaluation:
 
     @property
     def worth(self) -> tuple[bool, float]:
-        """What policies are compared by: the success rate, or, below all of these, the mean return."""
-        return self.says_success, self.success_rate if self.says_success else self.mean_return
+        """What policies are compared by: the success rate, or, where none succeeds, below that the mean return."""
+        succeeds = self.says_success and self.success_rate > 0.0
+        return succeeds, self.success_rate if succeeds else self.mean_return
 
     @property
     def interval(self) -> tuple[float, float]:

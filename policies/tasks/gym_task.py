@@ -19,7 +19,7 @@ from pydantic import ConfigDict, model_validator
 
 from policies.tasks.catalogue import GYM, UnknownTask, import_users_module
 from policies.tasks.episode import Outcome
-from policies.tasks.gym_autoreset import AutoresetRows, final_observations
+from policies.tasks.gym_autoreset import AutoresetRows
 from policies.tasks.gym_spaces import ActionWriter, ObservationReader, UnfitSpace
 from policies.tasks.layout import Layout
 from policies.tasks.reshaping import Rows
@@ -91,11 +91,8 @@ class GymTask(Task):
         )
         super().__init__(layout, env_count, number_defaults={}, device=device)
         self._seeds: list[int | None] = [None] * env_count
-        mode = self.envs.metadata["autoreset_mode"]
-        is_same_step = mode is AutoresetMode.SAME_STEP
-        self._autoreset = (
-            None if mode is AutoresetMode.DISABLED else AutoresetRows(env_count, is_same_step=is_same_step)
-        )
+        waits = self.envs.metadata["autoreset_mode"] is AutoresetMode.DISABLED
+        self._autoreset = None if waits else AutoresetRows(name, self.envs)
 
     @property
     def is_skipped(self) -> NDArray[np.bool_] | None:
@@ -121,16 +118,17 @@ class GymTask(Task):
         observations, rewards, *ends, info = self.envs.step(actions)
         is_terminated, is_truncated = (np.asarray(end, dtype=np.bool_) for end in ends)
         is_decided = np.ones(self.env_count, dtype=np.bool_)
-        is_begun = ~is_decided  # in this step, by themselves
-        if self._autoreset is not None:
-            is_begun = self._autoreset.step(is_terminated | is_truncated)
-            is_decided = ~self._autoreset.is_skipped
-        is_same_step = self._autoreset is not None and self._autoreset.is_same_step and bool(is_begun.any())
+        is_begun, autoreset = ~is_decided, self._autoreset  # begun in this step, by themselves
+        if autoreset is not None:
+            autoreset.step(is_terminated | is_truncated)
+            is_begun, is_decided = autoreset.is_begun, ~autoreset.is_skipped
         rows.of("rewards")[:] = np.where(is_decided, rewards, 0.0)
-        if is_same_step:
+        if autoreset is not None and autoreset.is_same_step and is_begun.any():
             self._show(rows, ~is_begun, observations)
-            self._show(rows, is_begun & is_decided, self._seen_last(info, is_begun))
-            info = {**info, **info["final_info"]} if isinstance(info.get("final_info"), Mapping) else info
+            is_final = is_begun & is_decided
+            if is_final.any():
+                self._show(rows, is_final, autoreset.final_observations(info, is_final), slice(None))
+            info = info["final_info"] if isinstance(info.get("final_info"), Mapping) else {}  # not of the next episode
         else:
             self._clear(rows, is_begun)
             self._show(rows, np.ones_like(is_decided), observations)
@@ -148,16 +146,10 @@ class GymTask(Task):
                 self._begin_rows(rows, is_over)
             else:
                 self._close(rows, is_over)
-        if is_same_step:
+        if autoreset is not None and autoreset.is_same_step:
             self._clear(rows, is_begun)
             self._show(rows, is_begun, observations)
         rows.write()
-
-    def _seen_last(self, info: Mapping[str, Any], is_over: NDArray[np.bool_]) -> Any:
-        try:
-            return final_observations(self.envs.single_observation_space, info, is_over)
-        except ValueError as error:
-            raise ValueError(f"{self.layout.task}: {error}") from None
 
     def _outcomes(self, is_terminated: Any, is_truncated: Any, info: Mapping[str, Any]) -> NDArray[np.int32]:
         """How each episode stands, shape (envs,)."""
@@ -210,20 +202,28 @@ class GymTask(Task):
             rows.of(name)[is_begun] = 0
         rows.of("episodes")[is_begun] += 1
 
-    def _show(self, rows: Rows, is_chosen: NDArray[np.bool_], observations: Any) -> None:
-        """Writes the newest frames of the chosen rows; the older ones move on."""
+    def _show(self, rows: Rows, is_chosen: NDArray[np.bool_], observations: Any, of: slice | None = None) -> None:
+        """Writes the newest frames of the chosen rows; the older ones move on.
+
+        Args:
+            rows: the buffers.
+            is_chosen: rows.
+            observations: of all rows.
+            of: which of the observations are those of the chosen rows; None: those in their places.
+        """
+        which = is_chosen if of is None else of
         if self._reader.elements:
             own, size = len(self._reader.elements), self.layout.frame_size
             shown = rows.of("observations")
             older = shown[is_chosen, size:]
             shown[is_chosen, : older.shape[1]] = older
             first = shown.shape[1] - size
-            frames = self._reader.floats(observations)[is_chosen]
+            frames = self._reader.floats(observations)[which]
             if not np.isfinite(frames).all():
                 raise ValueError(f"{self.layout.task}: an observation holds a number that is not finite")
             shown[is_chosen, first : first + own] = frames
         if self._reader.image is not None:
-            rows.of("images")[is_chosen] = self._reader.images(observations)[is_chosen]
+            rows.of("images")[is_chosen] = self._reader.images(observations)[which]
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Restores the arrays; the environments begin new episodes, seeded by how many there have been."""

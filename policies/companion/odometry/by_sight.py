@@ -1,16 +1,18 @@
 """Flying on without GNSS: visual odometry for the vehicle's own estimator, for as long as it needs it.
 
-In: the vehicle's fixes (GPS_RAW_INT), telemetry, pictures with who is where in them. Out: VISION_SPEED_ESTIMATE, as a
-tracking camera sends it, a text when it begins and when it is over, and how well the velocity is known, which the guard
-goes by. It measures only while GNSS is away: it costs milliseconds, and says nothing that a receiver does not say
-better. What the vehicle makes of it is the vehicle's (EKF2_EV_CTRL); one that does not use it loses its position as
-ever.
+In: the vehicle's fixes (GPS_RAW_INT), telemetry, pictures with who is where in them. Out: a velocity, as a tracking
+camera sends it (ODOMETRY, the only message with one that PX4 takes; VISION_SPEED_ESTIMATE to ArduPilot), a text when it
+begins and when it is over, and how well the velocity is known, which the guard goes by. It measures only while GNSS is
+away: it costs milliseconds, and says nothing that a receiver does not say better. What the vehicle makes of it is the
+vehicle's (EKF2_EV_CTRL); one that does not use it loses its position as ever.
 """
 
 from collections import deque
+from math import nan
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT
 from common.attitude import Vector
@@ -19,6 +21,8 @@ from policies.companion.odometry.visual_odometry import Motion, VisualOdometry
 from policies.companion.senses.poses import Pose
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
+
+Floats = NDArray[np.float64]
 
 FIX_HZ = 5.0
 AWAY_US = 600_000  # so long told of no fix GNSS is away: three messages;
@@ -30,7 +34,12 @@ INERTIAL_STD_M_S = 0.1  # when it was measured last
 _FIX_3D = 3  # GPS_FIX_TYPE
 _ALIKE = 9.0  # measurements in a row err alike, and count as one: the estimator takes each for one of its own
 _WAIT_US = 200_000  # for the attitude of a picture; it comes with the next telemetry
-_KEPT = 50  # velocities at 50 Hz: a second, by which no picture is late that is worth looking at
+_KEPT = 50  # velocities at 50 Hz: a second, by which no image is late that is worth looking at
+_FRESH_US = 100_000  # a velocity from telemetry that is older says nothing of now
+_MOST_M_S2, _MOST_STEP_M_S = 20.0, 0.3  # what changes faster is an estimate that is reset
+_LOCAL_NED = 1  # MAV_FRAME
+_VIO = 3  # MAV_ESTIMATOR_TYPE
+_UPPER = (0, 1, 2, 6, 7, 11)  # of a symmetric 6 x 6 matrix in MAVLink's order, its first 3 x 3
 
 
 class BySight:
@@ -50,7 +59,8 @@ class BySight:
         self._fixed_us = NEVER_US  # the last fix, likewise
         self._missed_us = NEVER_US  # when there was none last
         self._waiting: ImageFrame | None = None  # for its attitude
-        self._flown: deque[tuple[int, Vector]] = deque(maxlen=_KEPT)  # how fast the vehicle took itself to go
+        self._velocities: deque[tuple[int, Vector]] = deque(maxlen=_KEPT)  # telemetry, on the vehicle's clock
+        self._velocity_us = NEVER_US  # arrival of the newest of them
         self.is_away = False
         """GNSS is, and was there before."""
         self._away_us = NEVER_US  # since when, on the vehicle's clock
@@ -84,10 +94,9 @@ class BySight:
         if own.boot_us < self._boot_us:  # it has restarted: what was measured was at no time that it knows
             self._fixed_us, self.is_away, self.motion, self._waiting = NEVER_US, False, None, None
             self._odometry.forget()
-            self._flown.clear()
-        if own.boot_us != self._boot_us and np.isfinite(own.vel_ned).all():
-            self._flown.append((own.boot_us, own.vel_ned))
+            self._velocities.clear()
         self._boot_us = own.boot_us
+        self._note_velocity(own)
         self._judge(own, time_us)
         if image is not None:
             self._waiting = image if self.is_away else None
@@ -129,11 +138,16 @@ class BySight:
             return
         self._waiting = None
         motion = self._odometry.see(image.pixels, pose, self._people(own, pose), own.vel_ned)
-        if motion is not None and motion.std < self._most_std and self._vehicle is not None:
-            if self.motion is None:
-                self._vehicle.say("Companion: no GNSS: by sight")
-            self.motion = motion
-            self._send(self._vehicle, motion, own)
+        if motion is None or motion.std >= self._most_std or self._vehicle is None:
+            return
+        gained = self._gained_since(motion.time_us, own)
+        if gained is None:
+            return
+        if self.motion is None:
+            self._vehicle.say("Companion: no GNSS: by sight")
+        self.motion = motion
+        drift = DRIFT_M_S2 * (own.boot_us - motion.time_us) * 1e-6
+        self._send(self._vehicle, own.boot_us, motion.vel_ned + gained, _ALIKE * motion.cov + drift**2 * np.eye(3))
 
     def _people(self, own: Own, pose: Pose) -> list[np.ndarray[Any, np.dtype[np.float64]]]:
         """Where everybody was then who may be in the picture."""
@@ -141,24 +155,63 @@ class BySight:
         others = [person.pos_ned for person in self._senses.others_now(own)]
         return [seen.now(pose.time_us)[0], *others] if seen.sights else others
 
-    def _send(self, vehicle: VehicleLink, motion: Motion, own: Own) -> None:
-        """Tells a velocity as of now, by how much faster the vehicle says that it has become since the pictures.
+    def _note_velocity(self, own: Own) -> None:
+        """Takes the vehicle's velocity into the history, which begins anew where the estimate is reset."""
+        if own.position_us == self._velocity_us or not np.isfinite(own.vel_ned).all():
+            return
+        self._velocity_us = own.position_us
+        if self._velocities:
+            last_us, last = self._velocities[-1]
+            if own.boot_us <= last_us:
+                return
+            most = _MOST_STEP_M_S + _MOST_M_S2 * (own.boot_us - last_us) * 1e-6
+            if np.linalg.norm(np.subtract(own.vel_ned, last)) > most:
+                self._velocities.clear()
+        self._velocities.append((own.boot_us, own.vel_ned))
 
-        What is older than an estimator can remember it takes for how fast it goes now.
+    def _gained_since(self, time_us: int, own: Own) -> Floats | None:
+        """[m/s] (3,) by how much the vehicle's velocity has changed since an image; None: that is not known.
+
+        An estimator fuses what is older than its buffer as if it were current: 0.2 s late that is 0.7 m/s off behind a
+        runner. The vehicle's own change holds what has been corrected since: an innovation counts again until images
+        show it, three times at 0.3 s, which is stable while one corrects less than a third.
         """
-        time_us, vel_ned = motion.time_us, motion.vel_ned
-        if self._flown and self._flown[0][0] <= time_us:
-            times_us = [moment_us for moment_us, _ in self._flown]
-            then = [np.interp(time_us, times_us, axis) for axis in zip(*(vel for _, vel in self._flown), strict=True)]
-            time_us, vel_ned = own.boot_us, vel_ned + np.array(self._flown[-1][1]) - np.array(then)
-        north, east, down = (float(x) for x in vel_ned)
-        vehicle.send(
-            "VISION_SPEED_ESTIMATE",
-            usec=time_us,
-            x=north,
-            y=east,
-            z=down,
-            covariance=tuple(_ALIKE * float(x) for x in motion.cov.ravel()),
-            reset_counter=0,
-        )
+        history = self._velocities
+        if not history or history[0][0] > time_us or own.boot_us - history[-1][0] > _FRESH_US:
+            return None
+        times_us = [each_us for each_us, _ in history]
+        axes = zip(*(velocity for _, velocity in history), strict=True)
+        then = [float(np.interp(time_us, times_us, axis)) for axis in axes]
+        return np.subtract(history[-1][1], then)
+
+    def _send(self, vehicle: VehicleLink, time_us: int, vel_ned: Floats, cov: Floats) -> None:
+        """Sends a velocity with its covariance, as of a time on the vehicle's clock."""
         self.count += 1
+        north, east, down = (float(x) for x in vel_ned)
+        if vehicle.is_ardupilot:
+            covariance = tuple(float(x) for x in cov.ravel())
+            vehicle.send(
+                "VISION_SPEED_ESTIMATE", usec=time_us, x=north, y=east, z=down, covariance=covariance, reset_counter=0
+            )
+            return
+        upper = np.full(21, nan)
+        upper[list(_UPPER)] = cov[np.triu_indices(3)]
+        vehicle.send(
+            "ODOMETRY",
+            time_usec=time_us,
+            frame_id=_LOCAL_NED,
+            child_frame_id=_LOCAL_NED,
+            x=nan,
+            y=nan,
+            z=nan,
+            q=(nan,) * 4,
+            vx=north,
+            vy=east,
+            vz=down,
+            rollspeed=nan,
+            pitchspeed=nan,
+            yawspeed=nan,
+            pose_covariance=(nan,) * 21,
+            velocity_covariance=tuple(float(x) for x in upper),
+            estimator_type=_VIO,
+        )

@@ -23,6 +23,7 @@ def test_policy_is_found_by_its_task_and_by_its_own_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # where no run of one's own has the name
     for path in SHIPPED:
         assert pretrained(path.stem) == find_policy(path.stem) == path
+    assert pretrained("FollowMe") == pretrained("follow-me-tracked")
     for name in CATALOGUE:
         assert pretrained(name) in (None, *SHIPPED)
 

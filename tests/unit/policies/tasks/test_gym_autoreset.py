@@ -239,7 +239,7 @@ def test_who_does_not_tell_what_was_seen_last_is_refused_at_the_first_end():
     try:
         task = build_task("gym:Silent-v0", 2)
         task.reset(1)
-        with pytest.raises(ValueError, match=r"^gym:Silent-v0: an episode has ended, and info tells no final_obs"):
+        with pytest.raises(ValueError, match=r"^gym:Silent-v0: an episode has ended without a final_obs in info"):
             for _ in range(200):
                 task.step()
     finally:
@@ -286,3 +286,18 @@ def test_one_that_waits_for_resets_may_take_one_seed_alone():
         assert np.array_equal(*starts)
     finally:
         gymnasium.registry.pop("OneSeed-v0")
+
+
+def test_an_environment_without_an_end_is_refused_before_a_training_waits_for_ever(monkeypatch):
+    class Early(GymTask):
+        env_id = "SeveralPendulum-v1"
+
+        def outcome(self, decision):
+            return np.where(np.arange(2) == 0, Outcome.FELL, decision.outcomes)
+
+    monkeypatch.setattr("policies.tasks.gym_autoreset.WAIT_STEPS", 50)
+    task = build_task(Early, 2)
+    task.reset(1)
+    with pytest.raises(ValueError, match="gym:SeveralPendulum-v1: an episode that was ended early has gone on for 50"):
+        for _ in range(60):
+            task.step()
