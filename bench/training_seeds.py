@@ -91,7 +91,7 @@ TRAININGS = {
         ("navigate-rover-follow",),
         NAVIGATE_LONGEST,
         mean_speed,
-        episodes=1000,
+        episodes=400,
         numbers={"trees_per_ha": 300.0, "kept_m": 2.0},
     ),
     "drive-park": Training(
