@@ -86,6 +86,14 @@ TRAININGS = {
         episodes=1000,
         numbers={"trees_per_ha": 600.0},
     ),
+    "navigate-rover-follow": Training(
+        "NavigateRover",
+        ("navigate-rover-follow",),
+        NAVIGATE_LONGEST,
+        mean_speed,
+        episodes=400,
+        numbers={"trees_per_ha": 300.0, "kept_m": 2.0},
+    ),
     "drive-park": Training(
         "Drive", ("drive-park", "drive-park-careful"), DRIVE_LONGEST, touched_and_time, episodes=1000
     ),
