@@ -53,7 +53,8 @@ reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in two leg
 	@$(BIN)/python -m bench.training_seeds navigate $(ARGS)
 	@$(BIN)/python -m bench.navigate results/navigate-chosen.pt
 
-reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's policy from nothing, three seeds, choose and judge it (a quarter of an hour); without training: ARGS="judge"
+reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's two policies from nothing, three seeds of each, choose and judge them (an hour); without training: ARGS="judge"
+	@$(BIN)/python -m bench.training_seeds navigate-rover-follow $(ARGS)
 	@$(BIN)/python -m bench.training_seeds navigate-rover $(ARGS)
 	@$(BIN)/python -m bench.navigate_rover results/navigate-rover-chosen.pt
 
