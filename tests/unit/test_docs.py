@@ -37,6 +37,7 @@ NOT_RUN_HERE = {
     ".venv/bin/python -m bench.offline_d3rlpy.alike --d3rlpy-python d3rlpy-env/bin/python": "d3rlpy",
     ".venv/bin/python -m bench.offline_d3rlpy --d3rlpy-python d3rlpy-env/bin/python": "hours, and d3rlpy",
     "python3 -m venv d3rlpy-env && d3rlpy-env/bin/pip install torch==2.13.0 d3rlpy": "its environment",
+    f"{HONEYGUIDE} follow --policy follow-me": "flies what the line before trains for a quarter of an hour",
     "make train-demo": "minutes of training; tests/unit/mission/train runs its commands",
     'make tune ARGS="--airframe common/airframes/f450.toml"': "tests/unit/autopilot/test_tuning.py",
     ".venv/bin/python -m autopilot.estimator.derive": "tests/unit/autopilot/estimator/test_derive.py",
