@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from math import isfinite, isnan, nan
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from autopilot.interface.vehicle_state import BatteryLevel, LandedState, Mode, Severity
 from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT, ByteLink, ClientEnd, frame_of
 from autopilot.mavlink.dialects import Dialect, UnknownModeError
@@ -25,6 +28,7 @@ from policies.companion.engagement import Wish
 from policies.companion.odometry.steady_frame import SteadyFrame
 from policies.companion.vehicle_clock import VehicleClock
 
+Floats = NDArray[np.float64]
 Listener = Callable[[int, int, Any, int], None]
 """Called with who sent a message (system, component), its fields, and when it came in [us]."""
 
@@ -49,6 +53,8 @@ _GROUND_VEHICLES = (10, 11)  # MAV_TYPE: rover, boat
 _FAILSAFE = (5, 6)  # MAV_STATE: critical, emergency
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _LOCAL_NED, _BODY_NED = 1, 8  # MAV_FRAME
+_VIO = 3  # MAV_ESTIMATOR_TYPE
+_UPPER = (0, 1, 2, 6, 7, 11)  # of a symmetric 6 x 6 matrix in MAVLink's order, its first 3 x 3
 _VELOCITY_AND_YAW_RATE = 0b0101_1100_0111  # type_mask: position, acceleration and yaw are free
 _VELOCITY = 0b1101_1100_0111  # the yaw rate, too
 _HAS_POSITION, _HAS_VELOCITY = 1, 2  # FOLLOW_TARGET.est_capabilities
@@ -225,6 +231,40 @@ class VehicleLink:
             vy=y,
             vz=z,
             yaw_rate=yaw_rate if isfinite(yaw_rate) else 0.0,
+        )
+
+    def send_velocity(self, time_us: int, vel_ned: Floats, cov: Floats) -> None:
+        """A velocity for the vehicle's estimator: ODOMETRY without a pose, the only message with one that PX4 takes.
+
+        To ArduPilot it is VISION_SPEED_ESTIMATE.
+
+        Args:
+            time_us: on the vehicle's clock.
+            vel_ned: [m/s] (3,)
+            cov: [m²/s²] (3, 3)
+        """
+        north, east, down = (float(x) for x in vel_ned)
+        if self.is_ardupilot:
+            covariance = tuple(float(x) for x in cov.ravel())
+            self.send("VISION_SPEED_ESTIMATE", usec=time_us, x=north, y=east, z=down, covariance=covariance)
+            return
+        upper = np.full(21, nan)
+        upper[list(_UPPER)] = cov[np.triu_indices(3)]
+        pose = {"x": nan, "y": nan, "z": nan, "q": (nan,) * 4, "pose_covariance": (nan,) * 21}
+        self.send(
+            "ODOMETRY",
+            **pose,
+            time_usec=time_us,
+            frame_id=_LOCAL_NED,
+            child_frame_id=_LOCAL_NED,
+            vx=north,
+            vy=east,
+            vz=down,
+            rollspeed=nan,
+            pitchspeed=nan,
+            yawspeed=nan,
+            velocity_covariance=tuple(float(x) for x in upper),
+            estimator_type=_VIO,
         )
 
     def ask_for(self, wish: Wish) -> None:

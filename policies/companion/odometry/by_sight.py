@@ -1,14 +1,12 @@
 """Flying on without GNSS: visual odometry for the vehicle's own estimator, for as long as it needs it.
 
 In: the vehicle's fixes (GPS_RAW_INT), telemetry, pictures with who is where in them. Out: a velocity, as a tracking
-camera sends it (ODOMETRY, the only message with one that PX4 takes; VISION_SPEED_ESTIMATE to ArduPilot), a text when it
-begins and when it is over, and how well the velocity is known, which the guard goes by. It measures only while GNSS is
-away: it costs milliseconds, and says nothing that a receiver does not say better. What the vehicle makes of it is the
-vehicle's (EKF2_EV_CTRL); one that does not use it loses its position as ever.
+camera sends it, a text when it begins and when it is over, and how well the velocity is known, which the guard goes by.
+It measures only while GNSS is away: it costs milliseconds, and says nothing that a receiver does not say better. What
+the vehicle makes of it is the vehicle's (EKF2_EV_CTRL); one that does not use it loses its position as ever.
 """
 
 from collections import deque
-from math import nan
 from typing import Any
 
 import numpy as np
@@ -37,9 +35,6 @@ _WAIT_US = 200_000  # for the attitude of a picture; it comes with the next tele
 _KEPT = 50  # velocities at 50 Hz: a second, by which no image is late that is worth looking at
 _FRESH_US = 100_000  # a velocity from telemetry that is older says nothing of now
 _MOST_M_S2, _MOST_STEP_M_S = 20.0, 0.3  # what changes faster is an estimate that is reset
-_LOCAL_NED = 1  # MAV_FRAME
-_VIO = 3  # MAV_ESTIMATOR_TYPE
-_UPPER = (0, 1, 2, 6, 7, 11)  # of a symmetric 6 x 6 matrix in MAVLink's order, its first 3 x 3
 
 
 class BySight:
@@ -147,7 +142,9 @@ class BySight:
             self._vehicle.say("Companion: no GNSS: by sight")
         self.motion = motion
         drift = DRIFT_M_S2 * (own.boot_us - motion.time_us) * 1e-6
-        self._send(self._vehicle, own.boot_us, motion.vel_ned + gained, _ALIKE * motion.cov + drift**2 * np.eye(3))
+        cov = _ALIKE * motion.cov + drift**2 * np.eye(3)
+        self._vehicle.send_velocity(own.boot_us, motion.vel_ned + gained, cov)
+        self.count += 1
 
     def _people(self, own: Own, pose: Pose) -> list[np.ndarray[Any, np.dtype[np.float64]]]:
         """Where everybody was then who may be in the picture."""
@@ -183,35 +180,3 @@ class BySight:
         axes = zip(*(velocity for _, velocity in history), strict=True)
         then = [float(np.interp(time_us, times_us, axis)) for axis in axes]
         return np.subtract(history[-1][1], then)
-
-    def _send(self, vehicle: VehicleLink, time_us: int, vel_ned: Floats, cov: Floats) -> None:
-        """Sends a velocity with its covariance, as of a time on the vehicle's clock."""
-        self.count += 1
-        north, east, down = (float(x) for x in vel_ned)
-        if vehicle.is_ardupilot:
-            covariance = tuple(float(x) for x in cov.ravel())
-            vehicle.send(
-                "VISION_SPEED_ESTIMATE", usec=time_us, x=north, y=east, z=down, covariance=covariance, reset_counter=0
-            )
-            return
-        upper = np.full(21, nan)
-        upper[list(_UPPER)] = cov[np.triu_indices(3)]
-        vehicle.send(
-            "ODOMETRY",
-            time_usec=time_us,
-            frame_id=_LOCAL_NED,
-            child_frame_id=_LOCAL_NED,
-            x=nan,
-            y=nan,
-            z=nan,
-            q=(nan,) * 4,
-            vx=north,
-            vy=east,
-            vz=down,
-            rollspeed=nan,
-            pitchspeed=nan,
-            yawspeed=nan,
-            pose_covariance=(nan,) * 21,
-            velocity_covariance=tuple(float(x) for x in upper),
-            estimator_type=_VIO,
-        )
