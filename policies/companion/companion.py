@@ -8,7 +8,7 @@ lockstep flight on simulated time, and then the same flight gives the same bytes
 
 from collections import deque
 from collections.abc import Callable
-from math import isfinite, nan
+from math import isfinite
 
 import numpy as np
 
@@ -210,7 +210,7 @@ class Companion:
             is_alone=skill.is_alone(own),
             is_by_sight=skill.is_by_sight,
             is_covered=self._sending is not Sending.POLICY and skill.is_covered(own),
-            height_m=own.range_m if time_us - own.range_us <= TELEMETRY_OLD_US else nan,
+            height_m=own.range_m,
             pos_ned=own.pos_ned,
         )
 

@@ -107,7 +107,7 @@ class Engagement:
 
     def engage(self) -> None:
         """Tells the companion to take control as soon as everything is there; also if it has just let go."""
-        self._is_reported = True
+        self._is_reported = self.phase is not Phase.FLYING  # who flies has nothing to take
         if self.phase is Phase.RELEASED:
             self.phase = Phase.WAITING
 
@@ -218,6 +218,7 @@ class Engagement:
 
     def _handing_back(self, now: Situation) -> Orders:
         if not now.is_offboard:
+            self._is_reported &= now.is_holding  # any other mode is a pilot's
             self._aftermath.let_go(now.time_us, now.condition, self._before)
             return self._go(Phase.RELEASED, now)
         if now.time_us - self._since_us > HAND_BACK_PATIENCE_US:
@@ -278,10 +279,12 @@ class Engagement:
         return self._repeat(now, wish) if _is_just_heard(now) else Orders(Sending.STAY)
 
     def _stop(self, now: Situation) -> Orders:
-        """Somebody else has control."""
+        """Somebody else has control; nothing that was asked for before counts any more."""
+        self._is_reported = False
         return self._go(Phase.RELEASED, now, text=f"Companion: stopped: mode {now.mode_name}")
 
     def _fly(self, now: Situation) -> Orders:
+        self._is_reported = False
         self._aftermath.end()
         return self._go(Phase.FLYING, now, Sending.POLICY, text=self._flying_text)
 

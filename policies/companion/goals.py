@@ -70,6 +70,7 @@ class Goals:
         self._home_alt_m = nan
         self._items: tuple[MissionItem, ...] = ()  # of the plan as it was last looked at
         self._seq = -1  # that was current then
+        self._known = 0  # how much of what tells where its places are
         self._waypoints: list[Goal] = []  # that are left
         self.done = ""  # what has been reached, once nothing is left
         self._vehicle = vehicle
@@ -82,8 +83,10 @@ class Goals:
     def frame(self, time_us: int) -> None:
         """Keeps the plan; before `goal`."""
         self._plan.frame(time_us)
-        if (self._plan.items, self._plan.current_seq) != (self._items, self._seq):
+        known = self._known_count()
+        if (self._plan.items, self._plan.current_seq) != (self._items, self._seq) or known > self._known:
             self._items, self._seq = self._plan.items, self._plan.current_seq
+            self._known = max(known, self._known)
             self._waypoints = self._waypoints_of(self._items, self._seq)
             if self._waypoints:
                 self.done = ""
@@ -201,6 +204,12 @@ class Goals:
         return "it is outside the fence" if region_of(shapes, origin).clearance(*target_ned[:2]) < 0.0 else ""
 
     # ---- where places are ----
+
+    def _known_count(self) -> int:
+        """How many are known of position and home: a plan may be there before they are."""
+        own = self._vehicle.own
+        is_placed = own.origin is not None and isfinite(own.pos_ned[0])
+        return int(is_placed) + int(isfinite(self._home_alt_m))
 
     def _ned_of(self, lat_deg: float, lon_deg: float, alt_m: float) -> Vector | str:
         """A place in the vehicle's ned frame, or why it is not known."""

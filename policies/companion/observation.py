@@ -4,6 +4,7 @@ In: telemetry of the vehicle and the last report of the owner's phone, as they c
 vector, and the setpoint that an action asks for. One row, one launch each; 10 Hz.
 """
 
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,6 @@ from policies.tasks.follow_me.observe import (
 )
 from policies.tasks.layout import ImageElement, Layout
 
-HEIGHT_OLD_US = 500_000  # a range measured longer ago tells nothing of the ground below
 REPORT_LAG_S = 0.3  # of a phone's position when it arrives; guess: phones do not say, their clock is not ours
 
 Floats = NDArray[np.float32]
@@ -63,20 +63,19 @@ class CommandKernel:
         return (north, east, down), float(row["yaw_rate"])
 
 
-def write_own_row(row: Any, own: Own, time_us: int) -> None:
+def write_own_row(row: Any, own: Own) -> None:
     """Telemetry as a row of `OwnState`.
 
     Args:
         row: to be written.
         own: telemetry.
-        time_us: the companion's own clock.
     """
     row["pos_ned"] = own.pos_ned
     row["vel_ned"] = own.vel_ned
     row["q_ned_from_frd"] = own.q_ned_from_frd
     row["yaw_rate"] = rotated(own.q_ned_from_frd, own.omega_frd)[2]
-    is_valid = own.range_m == own.range_m and time_us - own.range_us < HEIGHT_OLD_US
-    row["height_m"] = own.range_m * rotated(own.q_ned_from_frd, (0.0, 0.0, 1.0))[2] if is_valid else 0.0
+    is_valid = isfinite(own.height_m)
+    row["height_m"] = own.height_m if is_valid else 0.0
     row["is_height_valid"] = int(is_valid)
 
 
@@ -111,7 +110,7 @@ class Observer:
             image_age_s: since the newest picture was taken.
         """
         self._age_s[0] = image_age_s
-        write_own_row(self._own[0], own, time_us)
+        write_own_row(self._own[0], own)
         self._write_report(owner, time_us)
         self._action[0] = last_action
         self._observe.launch()

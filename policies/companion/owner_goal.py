@@ -10,11 +10,14 @@ from math import hypot, nan
 
 import numpy as np
 
+from autopilot.interface.vehicle_state import Severity
+from common.image_stream import ImageFrame
 from policies.companion.goals import Goal
 from policies.companion.guard.guard import GOES_ON_S, SHORT_OF_M
 from policies.companion.guard.limits import faded, stopping_speed
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
+from policies.companion.image_fit import IMAGE_SHAPE, misfit
 from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
@@ -46,11 +49,14 @@ class OwnerGoal:
         self.may_search = False
         """It drives, under a guard: else who is lost is lost at once."""
         self._is_searching = False  # as told
+        self._wrong = ""  # with the newest image
 
     def frame(self, time_us: int) -> None:
         """Takes in what the camera sees, and what the phone has said."""
         own, owner = self._vehicle.own, self._vehicle.owner
         image = self._camera.take(time_us)
+        if image is not None and self._is_unfit(image):
+            image = None
         if image is not None and abs(own.boot_us - image.time_us) > IMAGE_OLD_US:
             image = None
         if image is not None:
@@ -62,6 +68,14 @@ class OwnerGoal:
         if self._silence_s <= self._settings.slow_s:
             self._last = self._owner
         self._tell()
+
+    def _is_unfit(self, image: ImageFrame) -> bool:
+        """Whether the senses can make nothing of an image; says so once."""
+        wrong = misfit(image, IMAGE_SHAPE)
+        if wrong and wrong != self._wrong:
+            self._vehicle.say(f"Companion: {wrong}: by the phone alone", Severity.WARNING)
+        self._wrong = wrong
+        return bool(wrong)
 
     @property
     def _known_us(self) -> int:

@@ -59,16 +59,15 @@ class TrackedObserver:
         self._command["vel_ned"][0] = vel_ned
         self._command["yaw_rate"][0] = yaw_rate if yaw_rate == yaw_rate else 0.0
 
-    def vector(self, own: Own, time_us: int, image_age_s: float) -> Floats:
+    def vector(self, own: Own, image_age_s: float) -> Floats:
         """The observation as of now.
 
         Args:
             own: telemetry.
-            time_us: the companion's own clock.
             image_age_s: since the newest image was taken.
         """
         senses = self._senses
-        write_own_row(self._own[0], own, time_us)
+        write_own_row(self._own[0], own)
         self._age_s[0] = image_age_s
         self._has_depth[0] = int(senses.image_us > 0)  # measured, or by colours
         near_m = senses.map.nearest_m(own.pos_ned, yaw_of(own.q_ned_from_frd), own.boot_us)

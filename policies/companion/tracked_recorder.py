@@ -40,17 +40,16 @@ class TrackedRecorder:
         if self._own_senses is not None:
             self._own_senses.sense(own, owner, image)
 
-    def frame(self, own: Own, flown: Velocity, time_us: int, image_age_s: float, seen: Floats | None) -> Floats:
+    def frame(self, own: Own, flown: Velocity, image_age_s: float, seen: Floats | None) -> Floats:
         """The frame of this decision.
 
         Args:
             own: telemetry.
             flown: what was asked for after it.
-            time_us: the companion's own clock.
             image_age_s: since the newest image was taken.
             seen: what the policy was shown; None: it is shown something else.
         """
-        frame = self._observer.vector(own, time_us, image_age_s) if seen is None else seen
+        frame = self._observer.vector(own, image_age_s) if seen is None else seen
         self._frame[:] = frame
         self._observer.flown(*flown)
         return self._frame.copy()

@@ -6,6 +6,7 @@ Images carry all of it: who connects to a vehicle that has been up for long lear
 SPAN_MS = 1 << 32
 REORDERED_MS = 10_000  # messages that overtook each other
 SILENT_MS = 3_600_000  # over the end of 32 bits; more is a restart
+_NEVER_UP_US = 10**15  # thirty years: no vehicle has been up for so long
 
 
 class VehicleClock:
@@ -30,7 +31,10 @@ class VehicleClock:
         return self._wide_ms * 1000
 
     def pictured(self, image_us: int) -> None:
-        """Takes the span that an image is from."""
-        if self._wide_ms is not None:
-            spans = round((image_us // 1000 - self._wide_ms) / SPAN_MS)
+        """Takes the span that an image is from; one that is not of about now in any span tells nothing."""
+        if self._wide_ms is None:
+            return
+        ahead_ms = image_us // 1000 - self._wide_ms
+        spans = round(ahead_ms / SPAN_MS)
+        if abs(ahead_ms - spans * SPAN_MS) <= REORDERED_MS and image_us < _NEVER_UP_US:
             self._wide_ms = max(self._wide_ms + spans * SPAN_MS, self._wide_ms % SPAN_MS)

@@ -22,17 +22,18 @@ from autopilot.mavlink.wire.codec import decode, message_id
 from autopilot.mavlink.wire.convert import degrees_from_e7, quat_from_wxyz
 from autopilot.mavlink.wire.number_bounds import POSITION_MAX_M, RATE_MAX_RAD_S, SPEED_MAX_M_S, is_known
 from autopilot.vehicles.rover.vehicle import ROVER
-from common.attitude import Quat, Vector
+from common.attitude import Quat, Vector, rotated
 from common.geodesy import GeoPoint, ned_from_geodetic
 from policies.companion.engagement import Wish
 from policies.companion.odometry.steady_frame import SteadyFrame
-from policies.companion.vehicle_clock import VehicleClock
+from policies.companion.vehicle_clock import REORDERED_MS, VehicleClock
 
 Floats = NDArray[np.float64]
 Listener = Callable[[int, int, Any, int], None]
 """Called with who sent a message (system, component), its fields, and when it came in [us]."""
 
 COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
+RANGE_OLD_US = 500_000  # a range measured longer ago tells nothing of the ground below
 REQUEST_US = 5_000_000  # rates are asked for again: the vehicle may have restarted
 TEXT_LENGTH = 50  # characters of one STATUSTEXT
 NEVER_US = -(1 << 62)
@@ -82,7 +83,7 @@ class Own:
     pos_ned: Vector = (nan, nan, nan)  # [m]
     vel_ned: Vector = (nan, nan, nan)  # [m/s]
     position_us: int = NEVER_US
-    range_m: float = nan  # along the body's down axis; NaN: no return
+    range_m: float = nan  # along the body's down axis; NaN: no return, or none heard of for RANGE_OLD_US
     range_us: int = NEVER_US
     heartbeat_us: int = NEVER_US
     is_ground_vehicle: bool = False
@@ -96,6 +97,16 @@ class Own:
     mode: Mode | None = None
     mode_name: str = "unknown"
     origin: GeoPoint | None = None  # of the local frame
+
+    @property
+    def is_range_heard(self) -> bool:
+        """Whether the range finder tells anything, if only that there is nothing in its reach."""
+        return self.attitude_us - self.range_us < RANGE_OLD_US
+
+    @property
+    def height_m(self) -> float:
+        """Above the ground [m], by the range finder; NaN: not known."""
+        return self.range_m * rotated(self.q_ned_from_frd, (0.0, 0.0, 1.0))[2]
 
     @property
     def is_under_way(self) -> bool:
@@ -157,6 +168,8 @@ class VehicleLink:
                 self._owner_reported(decode(frame_of(frame)).fields, time_us)
             elif name is not None and sysid == self.system_id and compid == AUTOPILOT_COMPONENT:
                 self._vehicle_reported(name, decode(frame_of(frame)).fields, time_us)
+        if time_us - self.own.range_us >= RANGE_OLD_US:
+            self.own.range_m = nan
 
     def listen(self, name: str, listener: Listener, rate_hz: float = 0.0) -> None:
         """Has a listener called with messages of one kind, whoever sent them.
@@ -322,9 +335,11 @@ class VehicleLink:
         wxyz = (fields.q1, fields.q2, fields.q3, fields.q4)
         omega_frd = (fields.rollspeed, fields.pitchspeed, fields.yawspeed)
         if is_known(1.1, *wxyz) and is_known(RATE_MAX_RAD_S, *omega_frd):  # of unit length, but for rounding
-            own = self.own
+            own, boot_us = self.own, self.clock.time_us(fields.time_boot_ms)
+            if 0 < own.boot_us - boot_us <= REORDERED_MS * 1000:
+                return  # overtaken by a newer one
             own.q_ned_from_frd, own.omega_frd = quat_from_wxyz(wxyz), omega_frd
-            own.boot_us, own.attitude_us = self.clock.time_us(fields.time_boot_ms), time_us
+            own.boot_us, own.attitude_us = boot_us, time_us
 
     def _status_reported(self, name: str, fields: Any, time_us: int) -> None:
         own = self.own

@@ -32,7 +32,6 @@ from policies.companion.skills.skill import Velocity
 from policies.companion.vehicle_link import NEVER_US, Own
 
 Floats = NDArray[np.float64]
-HEIGHT_OLD_US = 500_000  # a range to the ground measured longer ago tells nothing of it
 _MISSED_US = 300_000  # one in a hundred sectors misses what is there: so long what it told before counts
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 _STEERED = 1.15  # [1/m] no car turns on less: 0.5 m between axles, 30 degrees
@@ -128,7 +127,12 @@ class GoalGuard:
             as_it_goes = capped(np.array(own.vel_ned[:2]), self.settings.speed_max)  # asks for no more tilt
             kept = np.zeros(2) if self._drives else as_it_goes
             self.interventions.note(TILTED)
+        yaw_rate *= self._turning(level, kept, scale)
         return self._bounded(kept, scale * velocity[2], yaw_rate, own, age_s)
+
+    def _turning(self, level: Floats, kept: Floats, scale: float) -> float:  # noqa: ARG002
+        """The fraction of the yaw rate that is kept: who flies may look about as it slows down."""
+        return 1.0
 
     def begin(self, own: Own) -> None:
         """The policy takes over."""
@@ -158,8 +162,7 @@ class GoalGuard:
 
     def _within_heights(self, down: float, own: Own) -> float:
         s = self.settings
-        is_old = own.attitude_us - own.range_us > HEIGHT_OLD_US
-        height_m = np.nan if is_old else own.range_m * rotated(own.q_ned_from_frd, (0.0, 0.0, 1.0))[2]
+        height_m = own.height_m
         kept = within_heights(down, height_m, s) if isfinite(height_m) else 0.0
         is_low = isfinite(height_m) and height_m < s.height_min_m
         if not is_low:  # from the ground it goes up, whatever is above
@@ -213,8 +216,8 @@ class NoseGuard(GoalGuard):
 
     def _bounded(self, level: Floats, down: float, yaw_rate: float, own: Own, age_s: float) -> Velocity:  # noqa: ARG002
         s, speed = self.settings, float(level[0])
-        if abs(speed) < _STANDS_M_S:
-            return (speed, 0.0, 0.0), yaw_rate
+        if speed == 0.0:
+            return (0.0, 0.0, 0.0), yaw_rate
         curvature = float(np.clip(yaw_rate / speed, -_STEERED, _STEERED))
         way_m = way_along_m(self._round(own), curvature, speed < 0.0, s)
         nose = rotated(own.q_ned_from_frd, (1.0, 0.0, 0.0))
@@ -222,7 +225,13 @@ class NoseGuard(GoalGuard):
         own_speed = np.copysign(1.0, speed) * float(np.dot(nose, own.vel_ned))
         scale = min(1.0, braking_speed(way_m, own_speed, delay_s, s.brake) / abs(speed))
         self._count(NEAR_SOMETHING, level, scale * level)
-        return (scale * speed, 0.0, 0.0), scale * yaw_rate  # along the same arc
+        turns = yaw_rate if abs(speed) < _STANDS_M_S else scale * yaw_rate  # along the same arc, or on the spot
+        return (scale * speed, 0.0, 0.0), turns
+
+    def _turning(self, level: Floats, kept: Floats, scale: float) -> float:
+        """As much as of the speed, so that the arc stays; on the spot, as much as the ranges are trusted."""
+        wanted = float(np.hypot(*level))
+        return float(np.hypot(*kept)) / wanted if wanted > 0.0 else scale
 
     def _round(self, own: Own) -> Floats:
         """What is solid, ahead and right of the vehicle [m]."""

@@ -266,7 +266,7 @@ class Guard:
         room_m = self.senses.map.room_up_m(own.pos_ned, own.boot_us) - s.crown_m
         if isfinite(room_m):
             down = max(down, -stopping_speed(room_m, s.reaction_s, CLIMB_M_S))
-        kept = within_heights(down, own.range_m, s)
+        kept = within_heights(down, own.range_m, s) if own.is_range_heard else 0.0
         if abs(kept - allowed) > _COUNTED_M_S:
             self.interventions.note(HEIGHT)
         return kept

@@ -66,11 +66,11 @@ def within_heights(down: float, height_m: float, s: GuardSettings) -> float:
 
     Args:
         down: wanted [m/s].
-        height_m: above the ground; NaN: not known.
+        height_m: above the ground; NaN: nothing in reach.
         s: of the guard.
     """
     if not isfinite(height_m):
-        return max(down, 0.0)
+        return min(max(down, 0.0), SINK_M_S)
     if height_m < s.height_min_m:
         return min(down, -0.5 * CLIMB_M_S)
     if height_m > s.height_max_m:

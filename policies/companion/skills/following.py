@@ -4,7 +4,7 @@ A decision ten times a second: on each new image, and where none comes in time o
 then. A guard that does not believe the pilot bounds what it asks for. Where the owner is lost, it does not fly.
 """
 
-from math import isclose, isfinite
+from math import isfinite
 from typing import Protocol
 
 import numpy as np
@@ -17,6 +17,7 @@ from policies.companion.guard.guard import Guard, Stance
 from policies.companion.guard.interventions import BeginningReasons, Interventions
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
+from policies.companion.image_fit import misfit
 from policies.companion.observation import Observer, image_layout
 from policies.companion.odometry.by_sight import BySight
 from policies.companion.owner_watch import OwnerWatch
@@ -25,7 +26,7 @@ from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.tracked_observer import TrackedObserver
 from policies.companion.tracked_recorder import RECORD_LAYOUT, TrackedRecorder
 from policies.companion.vehicle_link import Own, Owner, VehicleLink
-from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, TILT_DEG, TRACKED
+from policies.tasks.follow_me.observe import EGO_BLIND, TRACKED
 from policies.tasks.layout import Layout
 
 DECISION_US = 100_000
@@ -39,9 +40,7 @@ SEEN_S = 1.0  # the last sight of who is in sight is no older
 OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
 NO_IMAGES = "no new pictures"
 OTHER_CLOCK = "pictures from the future"
-LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the images that policies are trained on
 STANDING = (Stance.STOP, Stance.SEARCH, Stance.BLIND)
-LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view
 
 
 class Pilot(Protocol):
@@ -151,12 +150,7 @@ class Following:
         old_us = GUARDED_OLD_US if self.guard is not None and self._is_flying else IMAGE_OLD_US
         if image is None or max(time_us - self._image_us, own.boot_us - image.time_us) > old_us:
             return OTHER_CLOCK if self._is_early else NO_IMAGES  # none came in, or what came in was old
-        if image.pixels.shape != self._pilot.image_shape:
-            return "pictures of another size"
-        lens = (image.hfov_deg, image.pitch_deg, image.depth_half_m)
-        if not all(isclose(here, there, rel_tol=LENS_TOLERANCE) for here, there in zip(lens, LENS, strict=True)):
-            return "pictures of another lens"
-        return ""
+        return misfit(image, self._pilot.image_shape)
 
     def _taken(self, vehicle: VehicleLink, time_us: int) -> ImageFrame | None:
         """A new image; one from the future is none."""
@@ -205,7 +199,7 @@ class Following:
         self._decided_us, self._is_new = time_us, False
         age_s = max(own.boot_us - image.time_us, time_us - self._image_us, 0) * 1e-6
         if self._tracked is not None:
-            vector = self._tracked.vector(own, time_us, age_s)
+            vector = self._tracked.vector(own, age_s)
         elif self._observer is not None:
             vector = self._observer.vector(own, self._owner, last_action, time_us, age_s)
         self.seen = vector.copy()
@@ -261,7 +255,7 @@ class Following:
             raise RuntimeError("keep_records comes first")
         age_s = max(own.boot_us - self._image.time_us, time_us - self._image_us, 0) * 1e-6 if self._image else 0.0
         seen = self.seen if self._tracked is not None and is_flying else None
-        return self._recorder.frame(own, flown, time_us, age_s, seen)
+        return self._recorder.frame(own, flown, age_s, seen)
 
     def recorded_goal(self, own: Own) -> Vector:  # noqa: ARG002
         return NO_GOAL

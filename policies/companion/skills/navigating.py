@@ -91,7 +91,7 @@ class Navigating(GoalSkill):
         if goal_ned is None or not self._is_due(time_us):
             return None
         shown_ned = _shown(goal_ned, own, self._shown_m)
-        vector = self._observer.vector(own, shown_ned, self.ranges.from_here(), last_action, time_us)
+        vector = self._observer.vector(own, shown_ned, self.ranges.from_here(), last_action)
         return self._act(vector, is_flying=is_flying)
 
     def setpoint(self, action: Floats, own: Own) -> Velocity:
@@ -175,7 +175,7 @@ class NavigationObserver:
         """As at an episode's start."""
         self._frames[:] = 0.0
 
-    def vector(self, own: Own, goal_ned: Vector, ranges_m: Floats, last_action: Floats, time_us: int) -> Floats:
+    def vector(self, own: Own, goal_ned: Vector, ranges_m: Floats, last_action: Floats) -> Floats:
         """The observation as of now: the last frames, oldest first.
 
         Args:
@@ -183,9 +183,8 @@ class NavigationObserver:
             goal_ned: [m] where to go.
             ranges_m: of sectors and beams.
             last_action: in [-1, 1], shape (4,).
-            time_us: the companion's own clock.
         """
-        write_own_row(self._own[0], own, time_us)
+        write_own_row(self._own[0], own)
         if self._drives:
             self._own[0]["is_height_valid"] = 0
         self._action[0], self._goal[0], self._ranges[0] = last_action, goal_ned, ranges_m

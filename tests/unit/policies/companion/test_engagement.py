@@ -203,3 +203,27 @@ def test_offboard_left_on_after_a_failed_hand_back_does_not_engage():
     bench.step(offboard=True, trouble="x", after_us=HAND_BACK_PATIENCE_US + 1)
     for _ in range(500):
         assert bench.step(offboard=True).sending is Sending.NOTHING  # the vehicle's own failsafe is to notice
+
+
+def test_told_to_engage_it_takes_nothing_back_from_a_pilot_who_chose_offboard_himself():
+    bench = Bench(is_reported=True)
+    bench.step(holding=False)
+    bench.step(offboard=True, holding=False)
+    assert bench.phase is Phase.FLYING
+    bench.step()  # the pilot's Hold
+    assert {bench.step().wish for _ in range(500)} == {Wish.NONE}
+
+
+def test_a_goto_to_one_that_flies_is_no_word_for_later():
+    bench = Bench().flying()
+    bench.machine.engage()
+    bench.step()  # the pilot's Hold
+    assert {bench.step().wish for _ in range(500)} == {Wish.NONE}
+
+
+@pytest.mark.parametrize(("is_hold", "wishes"), [(True, {Wish.NONE, Wish.OFFBOARD}), (False, {Wish.NONE})])
+def test_a_goto_while_it_hands_back_counts_unless_a_pilot_takes_over(is_hold, wishes):
+    bench = Bench().handing_back()
+    bench.machine.engage()
+    bench.step(holding=is_hold)
+    assert {bench.step().wish for _ in range(500)} == wishes

@@ -1,6 +1,6 @@
 """Where a companion has been asked to go: gotos and the plan, as messages."""
 
-from math import isnan, nan
+from math import isfinite, isnan, nan
 
 import pytest
 
@@ -22,15 +22,22 @@ ABOVE_SEA, ABOVE_HOME, ABOVE_GROUND = 0, 6, 11
 class Vehicle:
     """Its end of the link, with the goals of its companion."""
 
-    def __init__(self, *, is_ordered_by_goto=True, is_airborne=True):
+    def __init__(self, *, is_ordered_by_goto=True, is_airborne=True, is_placed=True):
         self.end, companion_end = memory_pair()
         self.link = VehicleLink(companion_end)
         self.goals = Goals(self.link, is_ordered_by_goto=is_ordered_by_goto)
         self.time_us = 0
         self._reader = FrameReader()
         self.fly(Mode.HOLD, is_airborne)
-        self.tell("GPS_GLOBAL_ORIGIN", latitude=473977420, longitude=85455940, altitude=488000)
+        if is_placed:
+            self.get_place()
+            self.get_home()
+
+    def get_home(self):
         self.tell("HOME_POSITION", latitude=473977420, longitude=85455940, altitude=490000)
+
+    def get_place(self):
+        self.tell("GPS_GLOBAL_ORIGIN", latitude=473977420, longitude=85455940, altitude=488000)
         self.tell("ATTITUDE_QUATERNION", q1=1.0)
         self.tell("LOCAL_POSITION_NED", x=0.0, y=0.0, z=-3.0)
 
@@ -217,3 +224,20 @@ def test_a_download_that_is_not_answered_is_begun_anew():
     assert [message.name for message in vehicle.said()] == ["MISSION_REQUEST_INT"]
     vehicle.step(PATIENCE_US + 1)
     assert [message.name for message in vehicle.step(RENEW_US + 1)] == ["MISSION_REQUEST_LIST"]
+
+
+@pytest.mark.parametrize("order", ["place, home", "home, place"])
+def test_a_plan_that_is_there_before_position_and_home_are_has_its_places_once_they_are(order):
+    at_once, late = Vehicle(), Vehicle(is_placed=False)
+    plan(at_once, TOUR)
+    plan(late, TOUR)
+    assert late.goals.goal is None
+    for what in order.split(", "):
+        late.get_place() if what == "place" else late.get_home()
+        late.step(20_000)
+    assert late.goals.goal == at_once.goals.goal
+    assert isfinite(late.goals.goal.pos_ned[2])
+    late.goals.reached()
+    late.get_home()
+    late.step(20_000)
+    assert late.goals.goal.name.startswith("waypoint 2")

@@ -1,10 +1,13 @@
 """Images in memory, as bytes, and over a stream."""
 
+import socket
+import time
+
 import numpy as np
 import pytest
 
 from common.image_stream import ImageFrame, ImageReader, ImageStreamError, frame_bytes
-from policies.companion.image_client import CameraUrlError, MemoryCamera, StreamCamera
+from policies.companion.image_client import SILENT_US, CameraUrlError, MemoryCamera, StreamCamera
 
 
 def frame(sequence=7, size=(4, 6, 4)):
@@ -60,3 +63,32 @@ def test_a_picture_in_memory_is_taken_once_and_the_newest_only():
 def test_other_addresses_are_refused(url):
     with pytest.raises(CameraUrlError, match="must be tcp://HOST:PORT"):
         StreamCamera(url)
+
+
+def test_a_camera_that_falls_silent_without_a_goodbye_is_looked_for_again():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        camera = StreamCamera(f"tcp://127.0.0.1:{server.getsockname()[1]}")
+        camera.take(0)
+        first, _ = server.accept()
+        with first:
+            first.sendall(frame_bytes(frame(1)))
+            assert taken(camera, 100_000).sequence == 1
+            camera.take(100_000 + SILENT_US)
+            assert camera.trouble == ""
+            camera.take(200_000 + SILENT_US)
+            assert camera.trouble == "the camera is silent"
+            camera.take(10 * SILENT_US)
+            second, _ = server.accept()
+        with second:
+            second.sendall(frame_bytes(frame(2)))
+            assert taken(camera, 10 * SILENT_US + 100_000).sequence == 2
+        camera.close()
+
+
+def taken(camera, time_us):
+    """The image that comes in about now; None after a second of waiting."""
+    for _ in range(100):
+        if (image := camera.take(time_us)) is not None:
+            return image
+        time.sleep(0.01)
+    return None

@@ -54,7 +54,7 @@ class Scene:
             own=Own(pos_ned=(0.0, 0.0, 0.0), vel_ned=(0.0, 0.0, 0.0), boot_us=0),
             owner=Owner(),
             clock=SimpleNamespace(pictured=lambda _: None),
-            say=self.texts.append,
+            say=lambda text, *_: self.texts.append(text),
         )
         self.camera = Camera()
         self.shows = Shows()
@@ -191,3 +191,11 @@ def test_who_was_heard_of_after_the_last_sight_is_looked_for_from_there():
     scene.pass_by(GUARD.search_s + 1.5, pixels=BLANK)
     assert scene.goal.is_searching
     assert scene.goal.goal.pos_ned[1] > 20.0
+
+
+@pytest.mark.parametrize("shape", [(64, 64, 3), (128, 128, 4), (48, 64, 4)])
+def test_images_that_it_can_make_nothing_of_are_said_once_and_it_goes_by_the_phone(shape):
+    scene = Scene()
+    scene.pass_by(6.0, (20.0, 5.0, -1.0), pixels=np.full(shape, 128, np.uint8))
+    assert scene.goal.goal.pos_ned[:2] == pytest.approx((20.0, 5.0), abs=0.5)
+    assert scene.texts == ["Companion: pictures of another size: by the phone alone"]

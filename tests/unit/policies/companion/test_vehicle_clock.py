@@ -50,3 +50,11 @@ def test_the_link_keeps_the_wide_time_and_sends_32_bits_of_it():
     assert link.own.boot_us == (SPAN_MS + 20) * 1000
     link.send_setpoint((1.0, 0.0, 0.0), 0.0)
     assert end.receive()
+
+
+@pytest.mark.parametrize("stamp_us", [1_764_400_000_000_000, 2**63 + 5, 2**64 - 1, 10 * SPAN_MS * 1000])
+def test_a_picture_of_another_clock_changes_nothing(stamp_us):
+    clock = VehicleClock()
+    clock.time_us(60_000)
+    clock.pictured(stamp_us)
+    assert clock.time_us(60_020) == 60_020_000

@@ -1,6 +1,6 @@
 """What a companion believes of its vehicle's mode, by heartbeats and by answers to its own requests."""
 
-from math import inf, nan
+from math import inf, isnan, nan
 
 import pytest
 
@@ -9,7 +9,7 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.transport.links import memory_pair
 from autopilot.mavlink.wire.codec import encode
 from policies.companion.engagement import Wish
-from policies.companion.vehicle_link import COMPONENT, VehicleLink
+from policies.companion.vehicle_link import COMPONENT, RANGE_OLD_US, VehicleLink
 
 
 @pytest.fixture
@@ -156,3 +156,24 @@ def test_home_is_asked_for_by_the_vehicles_own_return(vehicle):
     link.ask_for(Wish.RETURN)
     answer(end, link, 0)
     assert link.own.mode is Mode.RETURN
+
+
+def test_an_attitude_that_was_overtaken_is_no_news_and_no_restart(vehicle):
+    end, link = vehicle
+    for time_ms, roll_rate in ((20_000, 0.1), (19_960, 0.2)):
+        tell(end, link, "ATTITUDE_QUATERNION", time_boot_ms=time_ms, q1=1.0, rollspeed=roll_rate)
+        assert link.own.boot_us == 20_000_000
+        assert link.own.omega_frd[0] == pytest.approx(0.1)
+    tell(end, link, "ATTITUDE_QUATERNION", time_boot_ms=500, q1=1.0)  # it has restarted
+    assert link.own.boot_us == 500_000
+
+
+def test_a_range_finder_that_falls_silent_tells_no_height(vehicle):
+    end, link = vehicle
+    tell(end, link, "ATTITUDE_QUATERNION", q1=1.0)
+    tell(end, link, "DISTANCE_SENSOR", orientation=25, min_distance=10, max_distance=1200, current_distance=160)
+    assert link.own.height_m == pytest.approx(1.6)
+    link.receive(RANGE_OLD_US - 1)
+    assert link.own.height_m == pytest.approx(1.6)
+    link.receive(RANGE_OLD_US)
+    assert isnan(link.own.height_m)

@@ -266,3 +266,24 @@ def test_who_leans_too_far_with_old_ranges_still_stands() -> None:
     (level, _, _), _ = approach.guard.filtered(FULL_SPEED, approach.own)
     assert level == pytest.approx(0.0, abs=1e-6)
     assert approach.guard.stance is GoalStance.STOP
+
+
+def test_old_scans_slow_a_rover_down_along_the_same_arc_and_it_does_not_turn_blind() -> None:
+    approach = Approach(NoseGuard(S), GROUND_RING, 1e3, 0.0)
+    approach.fly(1.0, ((1.0, 0.0, 0.0), 0.5))
+    approach.is_scanning = False
+    ratios = set()
+    for _ in range(20):
+        approach.own.boot_us += 50_000
+        (speed, _, _), yaw_rate = approach.guard.filtered(((1.0, 0.0, 0.0), 0.5), approach.own)
+        if speed > 0.0:
+            ratios.add(round(yaw_rate / speed, 6))
+    assert ratios == {0.5}
+    assert (approach.guard.stance, speed, yaw_rate) == (GoalStance.STOP, 0.0, 0.0)
+    assert approach.guard.filtered(((0.0, 0.0, 0.0), 0.5), approach.own)[1] == 0.0
+
+
+def test_a_rover_that_creeps_stops_before_a_wall_as_well() -> None:
+    approach = Approach(NoseGuard(S), GROUND_RING, 1.0, 0.0)
+    approach.fly(40.0, ((0.049, 0.0, 0.0), 0.0))
+    assert approach.place + S.hull_half_length_m < 1.0

@@ -10,7 +10,7 @@ from policies.companion.guard.interventions import HEIGHT, NO_GNSS, TILTED
 from policies.companion.guard.settings import GuardSettings, guard_settings
 from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
-from policies.companion.vehicle_link import Own, Owner
+from policies.companion.vehicle_link import RANGE_OLD_US, Own, Owner
 from policies.person_detector.detector import Detection
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, TILT_DEG
 
@@ -315,3 +315,16 @@ def test_without_gnss_it_stays_where_it_lost_the_owner_and_gives_up_sooner(scene
     assert guard.is_lost(own)
     guard.vel_std = None  # GNSS is back: there is time to search
     assert not guard.is_lost(own)
+
+
+@pytest.mark.parametrize("wanted_down", [-2.0, 2.0])
+@pytest.mark.parametrize(("is_heard", "sinks"), [(True, 0.3), (False, 0.0)])
+def test_without_a_height_it_does_not_climb_and_sinks_slowly_where_its_range_finder_says_that_nothing_is_near(
+    scene: tuple[Guard, Own, Sees], is_heard: bool, sinks: float, wanted_down: float
+) -> None:
+    guard, own, _ = scene
+    flown(guard, own, 1.0)
+    own.range_m, own.attitude_us = float("nan"), 10_000_000
+    own.range_us = own.attitude_us - (0 if is_heard else RANGE_OLD_US)
+    kept = guard.filtered(((0.0, 0.0, wanted_down), 0.0), own)[0][2]
+    assert kept == (sinks if wanted_down > 0.0 else 0.0)
