@@ -82,11 +82,15 @@ def main(
     if folder is not None:
         if not (name and sees and made):
             raise typer.BadParameter("an entry has --name, --sees and --made")
+        if any(sign in text for text in (name, sees, made) for sign in "|\n"):
+            raise typer.BadParameter("--name, --sees and --made are cells of a table: no | and one line each")
         try:
             record = json.loads((folder / "flights.json").read_text(encoding="utf-8"))
             entry = entry_from(record, name, sees, made)
         except (OSError, EntryError) as error:
             raise typer.BadParameter(str(error)) from error
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise typer.BadParameter(f"{folder}/flights.json: not as the benchmark writes it: {error!r}") from error
         entries = [*(other for other in entries if other.name != name), entry]
         write_rows(entries)
     write_whole(PAGE, with_entries(PAGE.read_text(encoding="utf-8"), entries).encode())

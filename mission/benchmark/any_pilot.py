@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import onnxruntime
+from numpy.typing import NDArray
 
 from policies.companion.pilot import PilotError
 from policies.companion.skills.skill import Floats
@@ -22,7 +23,7 @@ def made_by_name(name: str, parts: tuple[str, ...]) -> Any:
     sys.path.insert(0, str(Path.cwd()))
     try:
         made = resolve_name(name)()
-    except (ImportError, AttributeError, ValueError, TypeError) as error:
+    except Exception as error:  # whatever anybody's code raises
         raise PilotError(f"{name}: no class that can be made without arguments: {error}") from error
     finally:
         sys.path.pop(0)
@@ -30,6 +31,55 @@ def made_by_name(name: str, parts: tuple[str, ...]) -> Any:
     if missing:
         raise PilotError(f"{name}: a pilot has {', '.join(missing)} too")
     return made
+
+
+class CheckedPilot:
+    """Anybody's pilot, whose mistakes are told as such: an exception, or an action of another size.
+
+    Args:
+        made: the pilot.
+        name: for the message.
+        action_size: numbers of an action.
+        seen: what it acts on once, before anything is flown.
+
+    Raises:
+        PilotError: it cannot act.
+    """
+
+    def __init__(self, made: Any, name: str, action_size: int, *seen: NDArray[Any]) -> None:
+        self._made, self._name, self._action_size = made, name, action_size
+        self.reset()
+        self.act(*seen)
+        self.reset()
+
+    def __getattr__(self, part: str) -> Any:
+        return getattr(self._made, part)
+
+    def reset(self) -> None:
+        """Forgets what came before."""
+        self._ask("reset")
+
+    def act(self, *seen: NDArray[Any]) -> Floats:
+        """The action for an observation, shape (action_size,).
+
+        Raises:
+            PilotError: there is none.
+        """
+        given = self._ask("act", *seen)
+        try:
+            action: Floats = np.asarray(given, dtype=np.float32)
+        except (TypeError, ValueError):
+            action = np.zeros(0, np.float32)
+        if action.shape != (self._action_size,):
+            gave = f"{action.size} in shape {action.shape}" if action.ndim and action.size else repr(given)[:40]
+            raise PilotError(f"{self._name}: act gives {self._action_size} numbers, not {gave}")
+        return action
+
+    def _ask(self, method: str, *seen: NDArray[Any]) -> Any:
+        try:
+            return getattr(self._made, method)(*seen)
+        except Exception as error:  # whatever anybody's code raises
+            raise PilotError(f"{self._name}: {method}: {type(error).__name__}: {error}") from error
 
 
 class OnnxNetwork:

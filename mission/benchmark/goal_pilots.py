@@ -7,7 +7,9 @@ ten times a second. A class needs `act(vector)` and `reset()`; `stack` says how 
 from pathlib import Path
 from typing import Any, TypeVar
 
-from mission.benchmark.any_pilot import OnnxNetwork, made_by_name
+import numpy as np
+
+from mission.benchmark.any_pilot import CheckedPilot, OnnxNetwork, made_by_name
 from policies.companion.pilot import PilotError
 from policies.companion.skills.skill import Floats
 from policies.companion.vector_pilot import VectorPilot
@@ -43,8 +45,10 @@ def goal_pilot(name: str, kind: type[P], stack: int) -> P:
     for part, given in {"stack": stack, **{part: getattr(kind, part, None) for part in _OF_THE_TASK}}.items():
         if not hasattr(made, part):
             setattr(made, part, given)
-    found: P = made
-    return found
+    task = kind.task
+    found: Any = CheckedPilot(made, name, len(task.continuous), np.zeros(made.stack * task.frame_size, np.float32))
+    checked: P = found
+    return checked
 
 
 class OnnxGoalPilot:

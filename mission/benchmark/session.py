@@ -20,6 +20,7 @@ from mission.benchmark.kept_flight import KeptFlight
 from mission.console.option_checks import UserError
 from mission.console.terminal import print_line
 from policies.companion.guard.settings import GuardSettings
+from policies.companion.pilot import PilotError
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,13 +52,13 @@ def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
     """The outcomes by condition, shown and written.
 
     Raises:
-        PilotError: no such policy.
+        PilotError: no such policy, or one that fails in flight.
         UserError: what is to be recorded cannot be.
     """
     benchmark = benchmark_of(options.task)
     benchmark.load(options.policy)  # refused before anything is flown
     console = Console()
-    names = options.conditions or tuple(benchmark.titles)
+    names = tuple(dict.fromkeys(options.conditions)) or tuple(benchmark.titles)
     outcomes: dict[str, list[Any]] = {name: [] for name in names}
     flights = [
         _Flight(options.task, options.policy, name, seed, options.guard, _folder(options.record, name, seed))
@@ -65,6 +66,10 @@ def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
         for seed in range(options.seed, options.seed + 2 * options.flights, 2)
     ]
     _make_folders(flights)
+    if options.out is not None:
+        _make(options.out, "--out")
+    if options.seed % 2 == 0 and options.record is None:
+        print_line(console, f"seed {options.seed}: even seeds are of worlds that trainings draw from")
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     spawned = multiprocessing.get_context("spawn")
     with (
@@ -73,12 +78,13 @@ def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
     ):
         bar = progress.add_task("flights", total=len(flights))
         for flight, outcome in zip(flights, pool.map(_flown, flights), strict=True):
-            outcomes[flight.condition].append(outcome)
+            flown = outcomes[flight.condition]
+            flown.append(outcome)
             progress.advance(bar)
-    rows = [benchmark.row(name, outcomes[name]) for name in names]
-    console.print(_shown(benchmark.columns, rows))
+            if options.out is not None and len(flown) == options.flights:  # whatever comes of the others
+                _write(options.out, options, benchmark, {name: found for name, found in outcomes.items() if found})
+    console.print(_shown(benchmark.columns, _rows(benchmark, outcomes)))
     if options.out is not None:
-        _write(options.out, options, _page(benchmark, rows, outcomes), outcomes)
         console.print(f"table and flights: {options.out}")
     if options.record is not None:
         print_line(console, f"recorded: {options.record}; honeyguide dataset build takes it")
@@ -104,11 +110,16 @@ def _make_folders(flights: Sequence[_Flight]) -> None:
     for folder in folders:
         if folder.exists():
             raise UserError(f"--record: {folder} is there already; name another folder")
+    for folder in folders:
+        _make(folder, "--record")
+
+
+def _make(folder: Path, option: str) -> None:
+    """Raises UserError if it cannot be made."""
     try:
-        for folder in folders:
-            folder.mkdir(parents=True)
+        folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise UserError(f"--record {error.filename}: cannot be made: {error.strerror}") from error
+        raise UserError(f"{option} {error.filename}: cannot be made: {error.strerror}") from error
 
 
 @cache
@@ -122,6 +133,8 @@ def _flown(flight: _Flight) -> Any:
     kept = KeptFlight(flight.folder, flight.policy)
     try:
         return benchmark_of(flight.task).fly(pilot, flight.condition, flight.seed, flight.guard, kept)
+    except PilotError as error:
+        raise PilotError(f"{flight.condition}, seed {flight.seed}: {error}") from error
     finally:
         kept.close()
 
@@ -139,16 +152,19 @@ def markdown(columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
     return "\n".join([head, *("| " + " | ".join(cells) + " |" for cells in rows)]) + "\n"
 
 
-def _page(benchmark: Benchmark, rows: Sequence[tuple[str, ...]], outcomes: dict[str, list[Any]]) -> str:
+def _rows(benchmark: Benchmark, outcomes: dict[str, list[Any]]) -> list[tuple[str, ...]]:
+    return [benchmark.row(name, flown) for name, flown in outcomes.items()]
+
+
+def _page(benchmark: Benchmark, outcomes: dict[str, list[Any]]) -> str:
     """The table, and below it what was missed."""
     missed = _misses(benchmark, outcomes)
     below = "".join(f"- {text}\n" for text in missed)
-    return markdown(benchmark.columns, rows) + (f"\nMissed:\n\n{below}" if missed else "")
+    return markdown(benchmark.columns, _rows(benchmark, outcomes)) + (f"\nMissed:\n\n{below}" if missed else "")
 
 
-def _write(out: Path, options: BenchmarkOptions, page: str, outcomes: dict[str, list[Any]]) -> None:
-    out.mkdir(parents=True, exist_ok=True)
-    write_whole(out / "table.md", page.encode())
+def _write(out: Path, options: BenchmarkOptions, benchmark: Benchmark, outcomes: dict[str, list[Any]]) -> None:
+    write_whole(out / "table.md", _page(benchmark, outcomes).encode())
     flown = {name: [asdict(outcome) for outcome in found] for name, found in outcomes.items()}
     record = {name: getattr(options, name) for name in ("task", "policy", "seed")}
     record |= {"has_guard": options.guard.is_on, "guard_settings": options.guard.changed, "flights": flown}

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.attitude import Vector
-from mission.benchmark.any_pilot import OnnxNetwork, made_by_name
+from mission.benchmark.any_pilot import CheckedPilot, OnnxNetwork, made_by_name
+from policies.companion.image_fit import IMAGE_SHAPE
 from policies.companion.pilot import PilotError, load_pilot
 from policies.companion.skills.following import Pilot
 from policies.companion.skills.skill import Floats
@@ -41,10 +42,17 @@ def any_pilot(name: str) -> Pilot:
         return OnnxPilot(Path(name))
     if ":" not in name:
         return load_pilot(name)
-    made: Pilot = made_by_name(name, ("kind", "image_shape", "reset", "act"))
+    made = made_by_name(name, ("kind", "image_shape", "reset", "act"))
+    if made.kind not in _ELEMENTS:
+        raise PilotError(f"{name}: kind {made.kind}: must be one of {', '.join(map(str, _ELEMENTS))}")
+    if made.image_shape != IMAGE_SHAPE:
+        raise PilotError(f"{name}: image_shape {made.image_shape}: must be {IMAGE_SHAPE}")
     if not hasattr(made, "owner_hfrd"):
         made.owner_hfrd = None
-    return made
+    vector, image = np.zeros(len(_ELEMENTS[made.kind]), np.float32), np.zeros(IMAGE_SHAPE, np.uint8)
+    checked: Any = CheckedPilot(made, name, len(ACTIONS), vector, image)
+    pilot: Pilot = checked
+    return pilot
 
 
 class OnnxPilot:
@@ -59,7 +67,7 @@ class OnnxPilot:
         PilotError: it cannot be read, or takes or gives something else.
     """
 
-    image_shape = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))
+    image_shape = IMAGE_SHAPE
 
     def __init__(self, path: Path) -> None:
         self._network = OnnxNetwork(path)

@@ -99,3 +99,19 @@ def test_a_folder_without_flights_is_refused_in_a_sentence(tmp_path):
     assert "flights.json" in "".join(re.findall(r"[^\s│]", result.output))  # however it is wrapped
     (tmp_path / "flights.json").write_text(json.dumps(record(0.9, 0.9, 0.9, 0.9)), encoding="utf-8")
     assert CliRunner().invoke(app, words[:1]).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{", "[]", "{}", '{"task": "follow", "has_guard": true, "flights": {"walk": [{}]}}']
+)
+def test_flights_that_the_benchmark_did_not_write_are_refused_in_a_sentence(tmp_path, text):
+    (tmp_path / "flights.json").write_text(text, encoding="utf-8")
+    result = CliRunner().invoke(app, [str(tmp_path), "--name", "a", "--sees", "all", "--made", "by hand"])
+    assert result.exit_code == 2
+    assert "flights.json" in "".join(re.findall(r"[^\s│]", result.output))
+
+
+def test_a_name_that_is_two_cells_is_refused(tmp_path):
+    (tmp_path / "flights.json").write_text(json.dumps(record(0.9, 0.9, 0.9, 0.9)), encoding="utf-8")
+    result = CliRunner().invoke(app, [str(tmp_path), "--name", "a | b", "--sees", "all", "--made", "by hand"])
+    assert result.exit_code == 2
