@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from common.attitude import Vector
 from mission.benchmark.any_pilot import CheckedPilot, OnnxNetwork, made_by_name
-from policies.companion.image_fit import IMAGE_SHAPE
 from policies.companion.pilot import PilotError, load_pilot
+from policies.companion.senses.image_fit import IMAGE_SHAPE
 from policies.companion.skills.following import Pilot
 from policies.companion.skills.skill import Floats
 from policies.tasks.flight.own_state import ACTIONS

@@ -17,10 +17,10 @@ from policies.companion.guard.guard import Guard, Stance
 from policies.companion.guard.interventions import BeginningReasons, Interventions
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
-from policies.companion.image_fit import misfit
 from policies.companion.observation import Observer, image_layout
 from policies.companion.odometry.by_sight import BySight
 from policies.companion.owner_watch import OwnerWatch
+from policies.companion.senses.image_fit import misfit
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.tracked_observer import TrackedObserver

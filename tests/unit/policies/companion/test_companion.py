@@ -10,7 +10,7 @@ from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from common.image_stream import ImageFrame
 from policies.companion.companion import MISFIT, NO_DECISION, NOT_ALONE, Companion
 from policies.companion.engagement import Phase
-from policies.companion.image_fit import LENS
+from policies.companion.senses.image_fit import LENS
 from policies.companion.skills.following import IMAGE_OLD_US, NO_IMAGES, OTHER_CLOCK, Following
 from policies.companion.vehicle_link import COMPONENT
 from policies.experts.follower import ScriptedFollower
