@@ -41,11 +41,12 @@ from policies.tasks.catalogue import (
     task_names,
 )
 from policies.tasks.layout import LayoutError
+from policies.tasks.task_error import TaskError
 from policies.tasks.task_params import NumberError
 
 USER_ERRORS = (
     CheckpointError, ConfigError, DemonstrationError, ExportError, LayoutError, NumberError, OfflineError, RunError,
-    SacError, UnknownTask,
+    SacError, TaskError, UnknownTask,
 )  # fmt: skip
 INFERENCE_EPISODES = 1000
 _ENDS = {"max_steps": "all steps done", "success_target": "success target reached", "stopped": "stopped by the user"}

@@ -24,6 +24,7 @@ from policies.tasks.gym_spaces import ActionWriter, ObservationReader, UnfitSpac
 from policies.tasks.layout import Layout
 from policies.tasks.reshaping import Rows
 from policies.tasks.task import Task, TaskSettings
+from policies.tasks.task_error import TaskError
 
 _SUCCESS_KEYS = ("is_success", "success")  # of an info: Stable-Baselines3 and Gymnasium-Robotics; Meta-World
 _IMAGES_PER_S = 30  # of environments that do not say (guess)
@@ -76,6 +77,8 @@ class GymTask(Task):
         Raises:
             UnknownTask: they cannot be made, or no policy here can see them or act in them.
         """
+        if not hasattr(self, "env_id"):
+            raise UnknownTask(f"{type(self).__name__}: names no env_id, the ID of its environments")
         name = f"{GYM}{self.env_id}"
         spec = _spec(self.env_id)
         self.envs: VectorEnv[Any, Any, Any] = _made(spec, env_count, settings)
@@ -123,6 +126,7 @@ class GymTask(Task):
             autoreset.step(is_terminated | is_truncated)
             is_begun, is_decided = autoreset.is_begun, ~autoreset.is_skipped
         rows.of("rewards")[:] = np.where(is_decided, rewards, 0.0)
+        self._check_finite(rows.of("rewards"), "a reward is")
         if autoreset is not None and autoreset.is_same_step and is_begun.any():
             self._show(rows, ~is_begun, observations)
             is_final = is_begun & is_decided
@@ -219,11 +223,14 @@ class GymTask(Task):
             shown[is_chosen, : older.shape[1]] = older
             first = shown.shape[1] - size
             frames = self._reader.floats(observations)[which]
-            if not np.isfinite(frames).all():
-                raise ValueError(f"{self.layout.task}: an observation holds a number that is not finite")
+            self._check_finite(frames, "an observation holds a number that is")
             shown[is_chosen, first : first + own] = frames
         if self._reader.image is not None:
             rows.of("images")[is_chosen] = self._reader.images(observations)[which]
+
+    def _check_finite(self, values: NDArray[Any], what: str) -> None:
+        if not np.isfinite(values).all():  # one of them would make NaN of all weights
+            raise TaskError(f"{self.layout.task}: {what} not finite")
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Restores the arrays; the environments begin new episodes, seeded by how many there have been."""
@@ -295,8 +302,8 @@ def _called(name: str, make: Any) -> Any:
     """What Gymnasium makes; what it or the environment's constructor will not take is told in one sentence."""
     try:
         return make()
-    except (gymnasium.error.Error, ImportError, TypeError, ValueError, AssertionError) as error:
-        raise UnknownTask(f"{name}: cannot be made: {_one_line(error)}") from None
+    except Exception as error:  # whatever a constructor of somebody else's raises
+        raise UnknownTask(f"{name}: cannot be made: {type(error).__name__}: {_one_line(error)}") from error
 
 
 def _one_line(error: Exception) -> str:

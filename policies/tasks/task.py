@@ -24,6 +24,7 @@ from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Outcome, StepBu
 from policies.tasks.goals import PositionGoal
 from policies.tasks.layout import Element, Layout
 from policies.tasks.reshaping import Array, Decision, Reshaping
+from policies.tasks.task_error import TaskError
 from policies.tasks.task_params import NumberError, Sampler, TaskParam, TaskParamTable
 
 Preset = Literal["as-documented", "as-coded", "improved"]
@@ -211,8 +212,11 @@ class Task:
 
         Args:
             frames: what the task shows without them, shape (rows, elements).
+
+        Raises:
+            TaskError: there are `added` elements, and the subclass has no such method.
         """
-        raise NotImplementedError(f"{type(self).__name__}: elements are added, but there is no method observe")
+        raise TaskError(f"{type(self).__name__}: elements are added, but there is no method observe")
 
     def outcome(self, decision: Decision) -> Array:
         """How each episode stands, shape (envs,): `Outcome` numbers. An end of the task's own stays an end."""

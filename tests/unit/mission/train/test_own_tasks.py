@@ -6,6 +6,7 @@ import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import onnxruntime
 import pytest
@@ -62,6 +63,41 @@ class Lights(gymnasium.Env):
 
 gymnasium.register("Lights-v0", entry_point=Lights)
 """
+FAULTS = """
+import numpy as np
+
+from lights import Lights, gymnasium
+from policies.tasks.gym_task import GymTask
+from policies.tasks.layout import Element
+from policies.tasks.roller_ball import RollerBall
+
+
+class Unpaid(Lights):
+    def step(self, action):
+        seen, _, *rest = super().step(action)
+        return seen, np.nan, *rest
+
+
+class NanPaid(RollerBall):
+    def reward(self, decision):
+        return decision.rewards * np.nan
+
+
+class NoSuchOutcome(RollerBall):
+    def outcome(self, decision):
+        return np.full(len(decision.rewards), 42)
+
+
+class Unobserved(RollerBall):
+    added = (Element("distance", "m"),)
+
+
+class Nameless(GymTask):
+    pass
+
+
+gymnasium.register("Unpaid-v0", entry_point=Unpaid, disable_env_checker=True)
+"""
 FEW = {"hyperparameters": {"batch_size": 128, "buffer_size": 512}, "network_settings": {"hidden_units": 16}}
 
 
@@ -72,7 +108,10 @@ def own_module(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "own_tasks.py").write_text(MODULE)
     yield
-    sys.modules.pop("own_tasks", None)
+    for module in ("own_tasks", "lights", "faults"):
+        sys.modules.pop(module, None)
+    for env_id in ("Lights-v0", "Unpaid-v0"):
+        gymnasium.registry.pop(env_id, None)
 
 
 def config(max_steps=1000, network=None, **settings):
@@ -240,3 +279,24 @@ def test_a_task_without_a_view_is_told_before_a_film_is_begun():
     assert result.exit_code == 2
     assert "Unseen: draws no view of itself" in result.stderr
     assert not Path("a.mp4").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--gym", "faults:Unpaid-v0"), "gym:faults:Unpaid-v0: a reward is not finite"),
+        (("--env", "faults:NanPaid"), "reward: must return finite numbers"),
+        (("--env", "faults:NoSuchOutcome"), "outcome: must return Outcome numbers, 0 to 8, not 42"),
+        (("--env", "faults:Unobserved"), "Unobserved: elements are added, but there is no method observe"),
+        (("--env", "faults:Nameless"), "Nameless: names no env_id, the ID of its environments"),
+        (("--gym", "FrozenLake-v1", "--env-args", "map_name=9x9"), "gym:FrozenLake-v1: cannot be made: KeyError"),
+    ],
+)
+def test_faults_of_tasks_of_ones_own_end_a_training_with_one_sentence(words, says):
+    Path("lights.py").write_text(LIGHTS, encoding="utf-8")
+    Path("faults.py").write_text(FAULTS, encoding="utf-8")
+    result = honeyguide("train", config(600, {"vis_encode_type": "compact"}), *words, "--run-id", "faulty")
+    assert result.exit_code == 2, result.output
+    assert says in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert not Path("results/faulty/Own.pt").exists()

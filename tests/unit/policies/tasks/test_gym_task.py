@@ -6,10 +6,19 @@ import pytest
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Text, Tuple, flatten
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from policies.tasks.catalogue import UnknownTask, build_task, file_stem, is_task_name, runs_code, settings_of
+from policies.tasks.catalogue import (
+    UnknownTask,
+    build_task,
+    file_stem,
+    is_task_name,
+    runs_code,
+    settings_of,
+    task_settings,
+)
 from policies.tasks.episode import Outcome
 from policies.tasks.gym_spaces import ActionWriter, ObservationReader, UnfitSpace
 from policies.tasks.gym_task import GymTask
+from policies.tasks.task_error import TaskError
 
 
 class Corridor(gymnasium.Env):
@@ -51,11 +60,38 @@ class Corridor(gymnasium.Env):
         return np.full((20, 30, 3), 7, np.uint8)
 
 
+class Faulty(gymnasium.Env):
+    """Shows or pays in the third step what is not finite, or raises where it is made."""
+
+    observation_space = Box(-1, 1, (1,))
+    action_space = Discrete(2)
+
+    def __init__(self, seen=0.0, paid=0.0, raises=""):
+        self.seen, self.paid, self.steps = seen, paid, 0
+        if raises == "key":
+            raise KeyError("9x9")
+        if raises == "file":
+            raise FileNotFoundError(2, "No such file or directory", "map.txt")
+        if raises == "runtime":
+            raise RuntimeError("no display")
+
+    def reset(self, *, seed=None, options=None):  # noqa: ARG002  (as Gymnasium calls it)
+        super().reset(seed=seed)
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action):  # noqa: ARG002  (as Gymnasium calls it)
+        self.steps += 1
+        is_third = self.steps == 3
+        return np.full(1, self.seen if is_third else 0.0, np.float32), self.paid if is_third else 0.0, False, False, {}
+
+
 @pytest.fixture(autouse=True)
 def registered():
     gymnasium.register("Corridor-v0", entry_point=Corridor)
+    gymnasium.register("Faulty-v0", entry_point=Faulty, disable_env_checker=True)
     yield
     gymnasium.registry.pop("Corridor-v0")
+    gymnasium.registry.pop("Faulty-v0")
 
 
 @pytest.mark.parametrize("env_id", ["CartPole-v1", "Pendulum-v1", "FrozenLake-v1"])
@@ -280,3 +316,38 @@ def test_names_say_whether_their_code_is_run():
     assert runs_code("gym:mine:CartPole-v1")
     assert runs_code("mine:Task")
     assert [file_stem(name) for name in ("gym:CartPole-v1", "a.b:MyTask")] == ["cart-pole-v1", "my-task"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"paid": np.nan}, "gym:Faulty-v0: a reward is not finite"),
+        ({"paid": -np.inf}, "gym:Faulty-v0: a reward is not finite"),
+        ({"seen": np.nan}, "gym:Faulty-v0: an observation holds a number that is not finite"),
+    ],
+)
+def test_what_is_not_finite_is_refused_before_anything_learns_from_it(arguments, says):
+    task = build_task("gym:Faulty-v0", 2, task_settings("gym:Faulty-v0", arguments))
+    task.reset(1)
+    task.step()
+    task.step()
+    with pytest.raises(TaskError, match=says):
+        task.step()
+
+
+@pytest.mark.parametrize(
+    ("raises", "says"),
+    [
+        ("key", "gym:Faulty-v0: cannot be made: KeyError: '9x9'"),
+        ("file", "gym:Faulty-v0: cannot be made: FileNotFoundError: .*map.txt"),
+        ("runtime", "gym:Faulty-v0: cannot be made: RuntimeError: no display"),
+    ],
+)
+def test_whatever_a_constructor_raises_is_told_in_one_sentence(raises, says):
+    with pytest.raises(UnknownTask, match=says):
+        build_task("gym:Faulty-v0", 1, settings_of("gym:Faulty-v0", [f"raises={raises}"]))
+
+
+def test_a_subclass_without_an_id_is_refused():
+    with pytest.raises(UnknownTask, match="Nameless: names no env_id"):
+        build_task(type("Nameless", (GymTask,), {}), 1)
