@@ -114,7 +114,7 @@ def chosen_config(request: TrainingRequest) -> Loaded:
     if is_own or (
         given.env is not None and given.env.startswith(GYM)
     ):  # what it lacks is told without naming a line of a recipe
-        build_task(settings.env_path, 1, settings_of(settings.env_path, settings.env_args))
+        build_task(settings.env_path, 1, settings_of(settings.env_path, settings.env_args)).close()
     return loaded
 
 

@@ -7,6 +7,7 @@ from its newest checkpoint bit for bit: all that an iteration depends on is in t
 import secrets
 from collections import deque
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -114,6 +115,7 @@ def train(config: RunConfig, watcher: Watcher) -> Result:
         training = Training(config, watcher)
         count = config.torch_settings.processes
         with (
+            closing(training.task),
             few_threads(has_images=training.task.layout.image is not None, processes=count),
             together(training.config, training.learner),
         ):

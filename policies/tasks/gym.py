@@ -101,6 +101,10 @@ class TaskEnv(gymnasium.Env[Observation, Any]):
             info,
         )
 
+    def close(self) -> None:
+        """Gives back what the task holds besides memory."""
+        self.task.close()
+
     def render(self) -> Any:
         """What is seen from above, RGB."""
         return self.task.top_view(0) if self.render_mode == "rgb_array" else None
@@ -254,6 +258,10 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
             is_late = is_running & ~self._arrays.is_over & (self._arrays.steps >= self._limit)
             if is_late.any():
                 cut_rows(self.task, is_late)
+
+    def close_extras(self, **_: Any) -> None:
+        """Gives back what the task holds besides memory."""
+        self.task.close()
 
     def render(self) -> Any:
         """A tuple of images, RGB."""

@@ -49,6 +49,11 @@ class TaskSettings(BaseModel):
     stack: int = Field(default=0, ge=0, le=50)
     """Observations in a stack; 0: as the preset has it."""
 
+    @property
+    def env_count_max(self) -> int | None:
+        """How many environments are worth having side by side, where nobody has said how many; None: any."""
+        return None
+
 
 @dataclass(frozen=True, slots=True)
 class Scores:
@@ -207,7 +212,7 @@ class Task:
         """What `step` does of the task's own."""
         self._step.launch()
 
-    def observe(self, frames: Array) -> Array:
+    def observe(self, frames: Array) -> Array:  # noqa: ARG002  (what subclasses take)
         """The values of the `added` elements, shape (rows, added).
 
         Args:
@@ -230,6 +235,9 @@ class Task:
         """Keeps the images of the episodes that just ended; to be called before those of the next ones are drawn."""
         image_rows = (self.env_count, self.layout.image_shape[0])
         wp.launch(keep_last_image_rows, image_rows, [self.buffers], device=self.device)
+
+    def close(self) -> None:
+        """Gives back what it holds besides memory: nothing, but where environments run elsewhere."""
 
     def set_params(self, values: Mapping[str, float | Sampler]) -> None:
         """Sets or randomises numbers from the next episodes on (domain randomisation, curricula).

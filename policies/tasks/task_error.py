@@ -1,4 +1,4 @@
-"""What a task cannot go on with: a method or an environment of the user's that returns what nothing can be learnt from."""
+"""What a task cannot go on with: something of the user's that returns what nothing can be learnt from."""
 
 
 class TaskError(ValueError):

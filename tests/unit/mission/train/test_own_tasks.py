@@ -1,5 +1,7 @@
 """`honeyguide train`, `eval`, `play` and `export` on tasks of the user's own and on environments of Gymnasium."""
 
+import multiprocessing
+import os
 import re
 import shlex
 import sys
@@ -13,6 +15,7 @@ import pytest
 import yaml
 
 from policies.learn.config import recipes
+from policies.learn.evaluate import evaluate
 from policies.learn.export.policy_file import load_policy
 from policies.tasks import catalogue
 from tests.documents import ROOT, blocks
@@ -300,3 +303,34 @@ def test_faults_of_tasks_of_ones_own_end_a_training_with_one_sentence(words, say
     assert says in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
     assert not Path("results/faulty/Own.pt").exists()
+
+
+def test_processes_are_ended_with_what_they_were_made_for(capfd):
+    pole = ("--gym", "CartPole-v1", "--env-args", "vectorization=async")
+    trained(config(512, num_areas=2), *pole, "--run-id", "pole")
+    assert not multiprocessing.active_children()
+    most = []
+    policy, card = load_policy(Path("results/pole/Own.pt"))
+    settings = catalogue.settings_of(card.task, [], card.settings)
+    evaluate(
+        policy,
+        card.task,
+        settings,
+        episodes=20,
+        seed=1,
+        progress=lambda _: most.append(len(multiprocessing.active_children())),
+    )
+    assert max(most) == min(20, len(os.sched_getaffinity(0)))
+    assert not multiprocessing.active_children()
+    result = honeyguide("play", "gym:CartPole-v1", "--env-args", "vectorization=async", "--random", "--mp4", "a.mp4")
+    assert result.exit_code == 0, result.output
+    assert not multiprocessing.active_children()
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_an_environment_that_renders_nothing_is_told_before_a_film_is_begun():
+    Path("lights.py").write_text(LIGHTS, encoding="utf-8")
+    result = honeyguide("play", "gym:lights:Lights-v0", "--random", "--mp4", "a.mp4")
+    assert result.exit_code == 2
+    assert "gym:lights:Lights-v0: renders no rgb_array" in result.stderr
+    assert not Path("a.mp4").exists()

@@ -13,7 +13,9 @@ from gymnasium.wrappers.vector import NormalizeObservation, NormalizeReward, Rec
 
 import policies  # noqa: F401  (registers the tasks)
 from policies.tasks.catalogue import CATALOGUE, UnknownTask, settings_class
+from policies.tasks.episode import Outcome
 from policies.tasks.gym import TaskEnv, TaskVectorEnv
+from policies.tasks.gym_task import GymTask
 from policies.tasks.task_params import NumberError
 
 ENVS = 5
@@ -54,6 +56,74 @@ def test_a_batch_does_what_gymnasiums_batch_of_single_environments_does(name, se
             observations, _ = theirs.reset(options={"reset_mask": is_over})
             assert np.array_equal(observations, ours.reset(options={"reset_mask": is_over})[0])
     assert ends > ENVS
+
+
+class Pole(GymTask):
+    env_id = "CartPole-v1"
+
+
+class ShortPole(GymTask):
+    """Ends at once where the cart begins on the right: in a row that is held, too."""
+
+    env_id = "CartPole-v1"
+
+    def outcome(self, decision):
+        return np.where(decision.next_observations[:, -4] > 0.03, Outcome.LOST, decision.outcomes)
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize("task", [Pole, ShortPole])
+@pytest.mark.parametrize("settings", [{"stack": 2}, {"max_episode_steps": 7}])
+def test_environments_of_gymnasium_in_a_batch_do_what_gymnasiums_batch_does(task, settings, mode):
+    theirs = SyncVectorEnv([lambda: TaskEnv(task, **settings)] * 3, autoreset_mode=mode)
+    ours = TaskVectorEnv(task, 3, autoreset_mode=mode, **settings)
+    seeds, ends = [1, 2, 3], 0
+    assert np.array_equal(theirs.reset(seed=seeds)[0], ours.reset(seed=seeds)[0])
+    for actions in actions_of(theirs, 2, 80):
+        there, here = theirs.step(actions), ours.step(actions)
+        for one, other in zip(there[:4], here[:4], strict=True):
+            assert np.array_equal(one, other)
+        is_over = here[2] | here[3]
+        ends += is_over.sum()
+        if mode is AutoresetMode.DISABLED and is_over.any():
+            observations, _ = theirs.reset(options={"reset_mask": is_over})
+            assert np.array_equal(observations, ours.reset(options={"reset_mask": is_over})[0])
+    assert ends > 6
+
+
+def test_environments_in_processes_are_held_too():
+    ours, theirs = (TaskVectorEnv(Pole, 2, autoreset_mode="NextStep", vectorization=how) for how in ("async", "sync"))
+    try:
+        assert np.array_equal(theirs.reset(seed=1)[0], ours.reset(seed=1)[0])
+        for _ in range(30):
+            assert np.array_equal(theirs.step(np.ones(2, dtype=int))[0], ours.step(np.ones(2, dtype=int))[0])
+    finally:
+        ours.close()
+
+
+def test_what_a_vector_environment_steps_begins_another_episode_with_the_step_after_its_end():
+    arguments = {"task": "RollerBall", "autoreset_mode": "Disabled", "numbers": {"step_limit": 3}}
+    gymnasium.register("Batch-v0", vector_entry_point=TaskVectorEnv, kwargs=arguments)
+    try:
+        envs = TaskVectorEnv("gym:Batch-v0", 2, autoreset_mode="NextStep")
+    finally:
+        gymnasium.registry.pop("Batch-v0")
+    envs.reset(seed=1)
+    seen = [envs.step(np.zeros((2, 2))) for _ in range(8)]
+    assert [bool(step[3].all()) for step in seen] == [False, False, True, False, False, False, True, False]
+    assert not seen[3][1].any()
+    assert not np.array_equal(seen[3][0], seen[2][0])
+
+
+@pytest.mark.parametrize("make", [lambda **how: TaskEnv(Pole, **how), lambda **how: TaskVectorEnv(Pole, 2, **how)])
+def test_closing_it_closes_what_runs_elsewhere(make):
+    env = make(vectorization="async")
+    env.reset(seed=1)
+    processes = env.task.envs.processes
+    assert all(process.is_alive() for process in processes)
+    env.close()
+    assert not any(process.is_alive() for process in processes)
+    env.close()
 
 
 def test_what_flies_begins_with_the_step_after_its_end_too():

@@ -1,5 +1,9 @@
 """Environments of Gymnasium as tasks, held against Gymnasium's own stepping of them."""
 
+import gc
+import os
+import signal
+
 import gymnasium
 import numpy as np
 import pytest
@@ -58,6 +62,11 @@ class Corridor(gymnasium.Env):
 
     def render(self):
         return np.full((20, 30, 3), 7, np.uint8)
+
+    def signals(self):
+        """Its process, the group of that, and what it does when it is interrupted or to end."""
+        handlers = tuple(signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP))
+        return os.getpid(), os.getpgrp(), handlers
 
 
 class Faulty(gymnasium.Env):
@@ -351,3 +360,61 @@ def test_whatever_a_constructor_raises_is_told_in_one_sentence(raises, says):
 def test_a_subclass_without_an_id_is_refused():
     with pytest.raises(UnknownTask, match="Nameless: names no env_id"):
         build_task(type("Nameless", (GymTask,), {}), 1)
+
+
+def test_processes_leave_signals_to_the_one_that_made_them():
+    before = signal.signal(signal.SIGTERM, lambda *_: None)
+    try:
+        task = build_task("gym:Corridor-v0", 2, settings_of("gym:Corridor-v0", ["vectorization=async"]))
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    try:
+        for pid, group, handlers in task.envs.call("signals"):
+            assert group == pid != os.getpid()
+            assert handlers == (signal.SIG_DFL,) * 3
+    finally:
+        task.close()
+
+
+def test_processes_end_with_the_task_that_nobody_has_closed():
+    task = build_task("gym:CartPole-v1", 2, settings_of("gym:CartPole-v1", ["vectorization=async"]))
+    processes = task.envs.processes
+    del task
+    gc.collect()
+    assert not any(process.is_alive() for process in processes)
+
+
+def test_closing_it_closes_each_environment():
+    closed = []
+    task = build_task("gym:Corridor-v0", 2)
+    for env in task.envs.envs:
+        env.unwrapped.close = lambda: closed.append(True)
+    task.close()
+    task.close()
+    assert closed == [True, True]
+
+
+@pytest.mark.parametrize("how", ["sync", "async"])
+def test_an_environment_that_renders_nothing_says_so(how):
+    task = build_task("gym:Faulty-v0", 2, settings_of("gym:Faulty-v0", [f"vectorization={how}"]))
+    task.reset(1)
+    try:
+        with pytest.raises(NotImplementedError, match="gym:Faulty-v0: renders no rgb_array"):
+            task.top_view(1)
+    finally:
+        task.close()
+
+
+def test_a_reset_of_some_rows_seeds_these_alone():
+    def third_starts():
+        task = build_task("gym:CartPole-v1", 3)
+        task.reset([1, 2, 3])
+        task.reset([9, 9, 9], np.array([True, False, False]))
+        task.begin(np.array([False, True, True]))
+        return task.buffers.observations.numpy().copy()
+
+    theirs = SyncVectorEnv([lambda: gymnasium.make("CartPole-v1")] * 3, autoreset_mode=AutoresetMode.DISABLED)
+    theirs.reset(seed=[1, 2, 3])
+    theirs.reset(seed=[9, None, None], options={"reset_mask": np.array([True, False, False])})
+    expected, _ = theirs.reset(options={"reset_mask": np.array([False, True, True])})
+    assert np.array_equal(third_starts(), expected)
