@@ -116,8 +116,8 @@ class GymTask(Task):
         """Starts environments anew; of a single seed each has the next one."""
         seeds = [seed + i for i in range(self.env_count)] if isinstance(seed, int) else seed
         chosen = np.ones(self.env_count, dtype=np.bool_) if is_chosen is None else is_chosen
-        for i in np.flatnonzero(chosen):
-            self._seeds[i] = seeds[i] % 2**31
+        pairs = zip(seeds, self._seeds, chosen, strict=True)
+        self._seeds = [new % 2**31 if is_new else old for new, old, is_new in pairs]
         super().reset(seed, is_chosen)
 
     def step_others(self, is_held: NDArray[np.bool_]) -> None:
@@ -126,7 +126,8 @@ class GymTask(Task):
             self.step()
             self.begin(is_held)
             return
-        self.envs.set_attr("is_held", is_held.tolist())
+        singles: Any = self.envs
+        singles.set_attr("is_held", is_held.tolist())
         self._is_held = is_held
         super().step_others(is_held)
         self._is_held = None
@@ -271,17 +272,17 @@ class GymTask(Task):
 
     def top_view(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:  # noqa: ARG002
         """What the environment renders, RGB; of any height."""
-        refusal = NotImplementedError(f"{self.layout.task}: renders no rgb_array")
-        is_single = isinstance(self.envs, SyncVectorEnv)
         try:
-            images = (
-                [self.envs.envs[i_env].render()] if is_single else self.envs.render() if renders(self.envs) else None
-            )
+            if isinstance(self.envs, SyncVectorEnv):
+                image = self.envs.envs[i_env].render()
+            else:
+                images: Any = self.envs.render() if renders(self.envs) else None
+                image = None if images is None else images[i_env]
         except NotImplementedError:
-            raise refusal from None
-        if images is None or images[0] is None:
-            raise refusal
-        return np.asarray(images[0 if is_single else i_env], dtype=np.uint8)
+            image = None
+        if image is None:
+            raise NotImplementedError(f"{self.layout.task}: renders no rgb_array")
+        return np.asarray(image, dtype=np.uint8)
 
 
 def gym_class(env_id: str) -> type[GymTask]:

@@ -196,6 +196,8 @@ def test_arguments_of_the_environment_are_settings():
         build_task("gym:Pendulum-v1", 1, settings_of("gym:Pendulum-v1", ["gravity=1.5"]))
     with pytest.raises(UnknownTask, match="vectorization: must be sync, async or vector_entry_point"):
         settings_of("gym:Pendulum-v1", ["vectorization=both"])
+    with pytest.raises(UnknownTask, match="gym:Pendulum-v1: preset: there are none, and no improved"):
+        settings_of("gym:Pendulum-v1", ["preset=improved"])
 
 
 def test_processes_do_what_one_does():
