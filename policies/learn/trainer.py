@@ -7,7 +7,6 @@ from its newest checkpoint bit for bit: all that an iteration depends on is in t
 import secrets
 from collections import deque
 from collections.abc import Mapping
-from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -108,14 +107,13 @@ def train(config: RunConfig, watcher: Watcher) -> Result:
         ExportError: a network cannot be written.
         LayoutError: a checkpoint of another task.
         NumberError: an environment parameter that the task has not.
-        UnknownTask: no such task, or a setting that it has not.
+        UnknownTask, TaskError: no such task, a setting that it has not, or something that nothing can be learnt from.
     """
     try:
         check_processes(config)
         training = Training(config, watcher)
         count = config.torch_settings.processes
         with (
-            closing(training.task),
             few_threads(has_images=training.task.layout.image is not None, processes=count),
             together(training.config, training.learner),
         ):
@@ -181,6 +179,7 @@ class Training:
             return self._finish(end)
         finally:
             self._events.close()
+            self.task.close()
 
     def _iterate(self) -> str:
         while self.learner.steps < self.behavior.max_steps:
