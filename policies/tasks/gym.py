@@ -5,8 +5,8 @@
 
 Keyword arguments are the task's settings, and: `numbers`, its parameters; `has_privileged`, whether observations show
 what critics alone may see. An observation is a vector, or a dict of `image`, `vector` and `privileged` where there is
-more. `info["outcome"]` names how an episode ended. Arrays that are returned are copies; whoever wants none takes a
-`Task` and its buffers.
+more. `info["outcome"]` names how an episode ended, but where `gymnasium.make`'s limit cuts it, outside of here. Arrays
+that are returned are copies; whoever wants none takes a `Task` and its buffers.
 """
 
 from collections.abc import Mapping, Sequence
