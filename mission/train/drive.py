@@ -1,6 +1,7 @@
 """`honeyguide drive`: a person drives a task in a window, at its real pace, and may keep that as demonstrations."""
 
 from collections import Counter
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -54,7 +55,7 @@ def drive_task(options: DriveOptions) -> str:
         check_is_free(options.record)
     task, settings = task_of(options.task, options.env_args, 1)
     driver = KeyboardDriver(task.layout)
-    with Window(options.task) as window:
+    with closing(task), Window(options.task) as window:
         drive = driven(task, driver, window, options)
     if options.record is None:
         return str(drive)

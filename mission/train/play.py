@@ -5,7 +5,7 @@ for it, and its expert where there is none or where settings were asked for that
 """
 
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from math import ceil, sqrt
 from pathlib import Path
@@ -60,8 +60,9 @@ def play_task(options: PlayOptions, console: Console) -> str:
         VideoError: the film cannot be written.
     """
     task, driver, who = cast(options)
-    _check_view(task)
     with ExitStack() as stack:
+        stack.enter_context(closing(task))
+        _check_view(task)
         if options.mp4 is not None:
             say = stack.enter_context(busy(console, f"filming {options.episodes} episodes of {task.layout.task}"))
             film = stack.enter_context(Mp4(options.mp4, task.decision_s))

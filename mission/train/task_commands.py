@@ -36,11 +36,12 @@ def demonstrate(
         from policies.experts.demonstration_file import DemonstrationFileError
         from policies.experts.episode_recording import RecordingError
         from policies.tasks.catalogue import UnknownTask
+        from policies.tasks.task_error import TaskError
 
         options = DemonstrateOptions(task, out, episodes, seed, tuple(env_args or ()), failures)
         try:
             demonstrate_task(options, Console())
-        except (UnknownTask, NoExpert, RecordingError, DemonstrationFileError) as error:
+        except (UnknownTask, TaskError, NoExpert, RecordingError, DemonstrationFileError) as error:
             refuse(str(error))
 
 
@@ -65,11 +66,12 @@ def play(
             from policies.experts.catalogue import NoExpert
             from policies.tasks.catalogue import UnknownTask
             from policies.tasks.layout import LayoutError
+            from policies.tasks.task_error import TaskError
 
         options = PlayOptions(task_or_policy, episodes, envs, seed, tuple(env_args or ()), policy, random, expert, mp4)
         try:
             typer.echo(play_task(options, Console()))
-        except (UnknownTask, NoExpert, PlayError, LayoutError, WindowError, VideoError) as error:
+        except (UnknownTask, TaskError, NoExpert, PlayError, LayoutError, WindowError, VideoError) as error:
             refuse(str(error))
 
 
@@ -90,9 +92,10 @@ def drive(
         from policies.experts.demonstration_file import DemonstrationFileError
         from policies.experts.keyboard import NoKeys
         from policies.tasks.catalogue import UnknownTask
+        from policies.tasks.task_error import TaskError
 
         options = DriveOptions(task, seed, tuple(env_args or ()), episodes, record, failures, speed)
         try:
             typer.echo(drive_task(options))
-        except (UnknownTask, NoKeys, WindowError, DemonstrationFileError) as error:
+        except (UnknownTask, TaskError, NoKeys, WindowError, DemonstrationFileError) as error:
             refuse(str(error))

@@ -41,11 +41,12 @@ from policies.tasks.catalogue import (
     task_names,
 )
 from policies.tasks.layout import LayoutError
+from policies.tasks.task_error import TaskError
 from policies.tasks.task_params import NumberError
 
 USER_ERRORS = (
     CheckpointError, ConfigError, DemonstrationError, ExportError, LayoutError, NumberError, OfflineError, RunError,
-    SacError, UnknownTask,
+    SacError, TaskError, UnknownTask,
 )  # fmt: skip
 INFERENCE_EPISODES = 1000
 _ENDS = {"max_steps": "all steps done", "success_target": "success target reached", "stopped": "stopped by the user"}
@@ -113,7 +114,7 @@ def chosen_config(request: TrainingRequest) -> Loaded:
     if is_own or (
         given.env is not None and given.env.startswith(GYM)
     ):  # what it lacks is told without naming a line of a recipe
-        build_task(settings.env_path, 1, settings_of(settings.env_path, settings.env_args))
+        build_task(settings.env_path, 1, settings_of(settings.env_path, settings.env_args)).close()
     return loaded
 
 

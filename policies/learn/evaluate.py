@@ -5,6 +5,7 @@ many episodes each environment plays is decided before the first one begins.
 """
 
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,15 +86,16 @@ def evaluate(
         NumberError: a number that the task has not.
     """
     device = next(policy.parameters()).device
-    task = build_task(name, min(episodes, ENVIRONMENTS), settings, str(device))
-    task.layout.require(policy.layout, source)
-    task.set_params(params or {})
-    task.reset(seed)
-    generator = None if is_greedy else torch.Generator(device).manual_seed(seed)
-    with few_threads(has_images=task.layout.image is not None):
-        tally = _Tally(_quota(episodes, task.env_count), longest)
-        evaluation = _play(policy, task, tally, generator, progress)
-    return replace(evaluation, says_success=task.says_success)
+    env_count = min(episodes, settings.env_count_max or ENVIRONMENTS, ENVIRONMENTS)
+    with closing(build_task(name, env_count, settings, str(device))) as task:
+        task.layout.require(policy.layout, source)
+        task.set_params(params or {})
+        task.reset(seed)
+        generator = None if is_greedy else torch.Generator(device).manual_seed(seed)
+        with few_threads(has_images=task.layout.image is not None):
+            tally = _Tally(_quota(episodes, task.env_count), longest)
+            evaluation = _play(policy, task, tally, generator, progress)
+        return replace(evaluation, says_success=task.says_success)
 
 
 def _quota(episodes: int, env_count: int) -> NDArray[np.int64]:

@@ -107,7 +107,7 @@ def train(config: RunConfig, watcher: Watcher) -> Result:
         ExportError: a network cannot be written.
         LayoutError: a checkpoint of another task.
         NumberError: an environment parameter that the task has not.
-        UnknownTask: no such task, or a setting that it has not.
+        UnknownTask, TaskError: no such task, a setting that it has not, or something that nothing can be learnt from.
     """
     try:
         check_processes(config)
@@ -179,6 +179,7 @@ class Training:
             return self._finish(end)
         finally:
             self._events.close()
+            self.task.close()
 
     def _iterate(self) -> str:
         while self.learner.steps < self.behavior.max_steps:

@@ -169,7 +169,7 @@ def _sentence(error: ErrorDetails, kind: "type[TaskSettings]") -> str:
         return f"no such setting; there are {', '.join(kind.model_fields)}"
     if error["type"] == "literal_error":
         expected = context["expected"].removeprefix("'', ").removeprefix("'' or ").replace("'", "")
-        return f"must be {expected}, not {error['input']}"
+        return f"must be {expected}, not {error['input']}" if expected else f"there are none, and no {error['input']}"
     return str(context.get("error", error["msg"][0].lower() + error["msg"][1:]))
 
 

@@ -5,11 +5,12 @@
 
 Keyword arguments are the task's settings, and: `numbers`, its parameters; `has_privileged`, whether observations show
 what critics alone may see. An observation is a vector, or a dict of `image`, `vector` and `privileged` where there is
-more. `info["outcome"]` names how an episode ended. Arrays that are returned are copies; whoever wants none takes a
-`Task` and its buffers.
+more. `info["outcome"]` names how an episode ended, but where `gymnasium.make`'s limit cuts it, outside of here. Arrays
+that are returned are copies; whoever wants none takes a `Task` and its buffers.
 """
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any
 
 import gymnasium
@@ -23,9 +24,8 @@ from numpy.typing import NDArray
 from policies.tasks.catalogue import UnknownTask, build_task, task_settings
 from policies.tasks.episode import Outcome
 from policies.tasks.gym_arrays import Array, Observation, TaskArrays, action_space, observation_space
-from policies.tasks.reshaping import cut_rows
 from policies.tasks.task import Task
-from policies.tasks.task_params import Sampler
+from policies.tasks.task_params import NumberError, Sampler
 
 Numbers = Mapping[str, float | tuple[float, float] | Sampler]
 
@@ -61,7 +61,7 @@ class TaskEnv(gymnasium.Env[Observation, Any]):
         self._arguments |= {"numbers": numbers, "has_privileged": has_privileged}
         self.task = _built(task, 1, numbers, settings)
         self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.task.decision_s))}
+        self.metadata = {**self.metadata, "render_fps": _render_fps(self.task)}
         self.observation_space = observation_space(self.task.layout, has_privileged=has_privileged)
         self.action_space = action_space(self.task.layout)
         self._arrays = TaskArrays(self.task, has_privileged=has_privileged)
@@ -89,7 +89,7 @@ class TaskEnv(gymnasium.Env[Observation, Any]):
         arrays = self._arrays
         if self._is_next_begun or not arrays.is_begun:
             raise ResetNeeded("step: no episode is running: call reset() first")
-        arrays.act(np.asarray(action)[None])
+        arrays.act(action, is_single=True)
         self.task.step()
         is_over = self._is_next_begun = bool(arrays.is_over[0])
         info = {"outcome": Outcome(int(arrays.outcomes[0])).name.lower()} if is_over else {}
@@ -100,6 +100,10 @@ class TaskEnv(gymnasium.Env[Observation, Any]):
             bool(arrays.is_truncated[0]),
             info,
         )
+
+    def close(self) -> None:
+        """Gives back what the task holds besides memory."""
+        self.task.close()
 
     def render(self) -> Any:
         """What is seen from above, RGB."""
@@ -143,7 +147,8 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
             render_mode: `rgb_array`, or none.
             autoreset_mode: when the episode after an end begins: in the same step, which shows the last observation as
                 `info["final_obs"]`; with the next step, whose action is not used; or by `reset` alone.
-            max_episode_steps: decisions after which an episode is truncated, whatever the task's own limit is.
+            max_episode_steps: decisions after which an episode is truncated, whatever the task's own limit is; none, or
+                -1 as Gymnasium has it: never.
             numbers: its parameters.
             has_privileged: whether observations have what critics alone may see.
             settings: of the task.
@@ -161,16 +166,18 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
         }
         self._arguments |= {"autoreset_mode": autoreset_mode, "max_episode_steps": max_episode_steps}
         self._arguments["has_privileged"] = has_privileged
+        if max_episode_steps is not None and max_episode_steps != -1 and max_episode_steps < 1:
+            raise NumberError(f"max_episode_steps: must be at least 1, or -1 for no limit, not {max_episode_steps}")
         self.task = _built(task, num_envs, numbers, settings)
         self.num_envs = num_envs
         self.render_mode = render_mode
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode, "render_fps": _render_fps(self.task)}
         self.single_observation_space = observation_space(self.task.layout, has_privileged=has_privileged)
         self.single_action_space = action_space(self.task.layout)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._limit = max_episode_steps
+        self._limit = None if max_episode_steps == -1 else max_episode_steps
         self._arrays = TaskArrays(self.task, has_privileged=has_privileged)
         self._is_ended = np.zeros(num_envs, dtype=np.bool_)  # and nobody has been shown the next episode
 
@@ -180,7 +187,8 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
         """Starts episodes.
 
         Args:
-            seed: of all environments, or a list with one of each, None: of its own choice.
+            seed: of the first environment, the others' are the numbers that follow; or a list with one of each. None:
+                the next episode, of which the first one's seed is drawn.
             options: `reset_mask`, shape (envs,): which environments begin; the others go on. Those that have ended
                 begin the episode that the task has begun by itself.
 
@@ -194,11 +202,8 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
         chosen = np.ones(self.num_envs, dtype=np.bool_) if mask is None else mask
         if not self._arrays.is_begun and not chosen.all():
             raise ResetNeeded("reset: reset_mask: no episode is running: reset all environments first")
-        if mask is None and (seed is None or isinstance(seed, int)):
-            self._arrays.reset(_drawn_seed(self.np_random))
-        else:
-            self._begin(chosen, [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed)
-        self._is_ended &= ~chosen
+        self._begin(chosen, [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed)
+        self._is_ended = self._is_ended & ~chosen  # a new array: the info of the last step has the old one
         return self._arrays.last_seen(self._is_ended), {}
 
     def _begin(self, is_chosen: NDArray[np.bool_], seeds: Sequence[int | None] | None) -> None:
@@ -233,7 +238,8 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
             self.task.step_others(held)
         else:
             self.task.step()
-        self._cut(~held)
+        if self._limit is not None:
+            arrays.cut(self._limit, ~held)
         is_over = arrays.is_over & ~held
         info: dict[str, Any] = {}
         if is_over.any():
@@ -241,19 +247,16 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
             info = dict(outcome)
         is_same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
         if is_same_step and is_over.any():
-            info |= {"final_obs": arrays.observation(is_final=True), "_final_obs": is_over}
+            info |= {"final_obs": arrays.final_observations(is_over), "_final_obs": is_over}
             info |= {"final_info": outcome, "_final_info": is_over}
         rewards = np.where(held, 0.0, arrays.rewards).astype(np.float64)
         is_terminated, is_truncated = arrays.is_terminated & ~held, arrays.is_truncated & ~held
         self._is_ended = np.zeros_like(is_over) if is_same_step else is_over
         return arrays.last_seen(self._is_ended), rewards, is_terminated, is_truncated, info
 
-    def _cut(self, is_running: NDArray[np.bool_]) -> None:
-        """Truncates the episodes that have lasted long enough."""
-        if self._limit is not None:
-            is_late = is_running & ~self._arrays.is_over & (self._arrays.steps >= self._limit)
-            if is_late.any():
-                cut_rows(self.task, is_late)
+    def close_extras(self, **_: Any) -> None:
+        """Gives back what the task holds besides memory."""
+        self.task.close()
 
     def render(self) -> Any:
         """A tuple of images, RGB."""
@@ -273,22 +276,33 @@ def _built(task: str | type[Task], env_count: int, numbers: Numbers | None, sett
     built = build_task(task, env_count, task_settings(task, settings))
     if built.is_skipped is not None:
         raise UnknownTask(f"{built.layout.task}: begins episodes by itself: take it from gymnasium.make_vec")
-    built.set_params(
-        {
-            name: Sampler(intervals=((value[0], value[1]),)) if isinstance(value, (tuple, list)) else value
-            for name, value in (numbers or {}).items()
-        }
-    )
+    if not isinstance(numbers, Mapping | None):
+        raise NumberError(f"numbers: must be a dictionary of parameters and their values, not {numbers}")
+    built.set_params({name: _drawn_from(name, value) for name, value in (numbers or {}).items()})
     return built
 
 
+def _drawn_from(name: str, value: Any) -> float | Sampler:
+    if not isinstance(value, (tuple, list)):
+        return value
+    if len(value) != 2 or not all(isinstance(end, Real) for end in value):
+        raise NumberError(f"{name}: a range is a pair of numbers, not {value}")
+    return Sampler(intervals=((value[0], value[1]),))
+
+
+def _render_fps(task: Task) -> int:
+    return max(1, round(1.0 / task.decision_s))
+
+
 def _progress(env: TaskEnv | TaskVectorEnv) -> dict[str, Any]:
-    """How far an environment is."""
-    return {"task": env.task.state(), "is_begun": env._arrays.is_begun, "np_random": env._np_random, "spec": env.spec}
+    """How far an environment is, and the generators of its spaces."""
+    spaces = {name: value for name, value in vars(env).items() if name.endswith("_space")}
+    own = {name: getattr(env, name) for name in ("spec", "_np_random", "_np_random_seed")}
+    return {"task": env.task.state(), "is_begun": env._arrays.is_begun, "attributes": {**own, **spaces}}
 
 
 def _go_on(env: TaskEnv | TaskVectorEnv, state: Mapping[str, Any]) -> None:
-    env.spec, env._np_random = state["spec"], state["np_random"]
+    vars(env).update(state["attributes"])
     env._arrays.is_begun = state["is_begun"]
     env.task.load_state(state["task"])
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from policies.tasks.catalogue import UnknownTask
 from policies.tasks.layout import Layout
+from policies.tasks.reshaping import cut_rows
 from policies.tasks.task import Task
 
 Array = NDArray[Any]
@@ -64,26 +65,60 @@ class TaskArrays:
                 there[is_ended] = here
         return now
 
-    def act(self, actions: Array, is_held: NDArray[np.bool_] | None = None) -> None:
-        """Writes the actions, one row per environment; those of the held rows are not looked at.
+    def final_observations(self, is_over: NDArray[np.bool_]) -> Array:
+        """What the rows that have ended saw last; of dicts an array of one each, as of SyncVectorEnv."""
+        last = self.observation(is_final=True)
+        if not isinstance(last, dict):
+            return last
+        each = np.full(len(is_over), None, dtype=object)
+        for i in np.flatnonzero(is_over):
+            each[i] = {name: part[i] for name, part in last.items()}
+        return each
+
+    def cut(self, limit: int, is_running: NDArray[np.bool_]) -> None:
+        """Truncates episodes of the running rows that have lasted so many decisions."""
+        is_late = is_running & ~self.is_over & (self.steps >= limit)
+        if is_late.any():
+            cut_rows(self._task, is_late)
+
+    def act(self, actions: Any, is_held: NDArray[np.bool_] | None = None, *, is_single: bool = False) -> None:
+        """Writes the actions: the kernels trust what they are given.
+
+        Args:
+            actions: one row per environment.
+            is_held: rows whose actions are not looked at, shape (envs,).
+            is_single: whether it is the action of one environment, and no batch.
 
         Raises:
-            ValueError: a choice that a branch has not, or a number that is none: the kernels trust what they are given.
+            ValueError: another shape, a choice that a branch has not, or a number that is none.
         """
-        if self._task.layout.branches:
-            choices = np.array(actions).reshape(self.branches.shape)
+        has_branches = bool(self._task.layout.branches)
+        shape = self.branches.shape if has_branches else self.continuous.shape
+        given = np.asarray(actions)
+        _check_actions(given, shape[1:] if is_single else shape, are_choices=has_branches)
+        if has_branches:
+            choices = given.reshape(shape).copy()
             if is_held is not None:
                 choices[is_held] = 0
             if ((choices < 0) | (choices >= self._sizes)).any():
                 raise ValueError(f"action: choices must be at least 0 and below {self._sizes.tolist()}")
             self.branches[:] = choices
         else:
-            pushes = np.array(actions, dtype=np.float32)
+            pushes = given.reshape(shape).astype(np.float32)
             if is_held is not None:
                 pushes[is_held] = 0.0
             if not np.isfinite(pushes).all():
                 raise ValueError("action: must be finite")
             self.continuous[:] = np.clip(pushes, -1.0, 1.0)
+
+
+def _check_actions(given: Array, shape: tuple[int, ...], *, are_choices: bool) -> None:
+    """Refuses actions of another shape, which NumPy would stretch, or of another kind; a single choice is a number."""
+    is_one_choice = are_choices and shape[-1] == 1
+    if given.shape != shape and not (is_one_choice and given.shape == shape[:-1]):
+        raise ValueError(f"action: must have shape {shape[:-1] if is_one_choice else shape}, not {given.shape}")
+    if given.dtype.kind not in ("biu" if are_choices else "biuf"):
+        raise ValueError(f"action: must be {'whole ' * are_choices}numbers, not {given.dtype}")
 
 
 def _parts(observation: Observation) -> list[Array]:

@@ -13,6 +13,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 from numpy.typing import NDArray
 
+from policies.tasks.task_error import TaskError
+
 Rows = NDArray[np.bool_]
 
 WAIT_STEPS = 100_000  # for an environment's own end; guess
@@ -43,7 +45,7 @@ class AutoresetRows:
         """Books a step after which these episodes of the environment are over.
 
         Raises:
-            ValueError: an environment whose episode was ended early has no end of its own.
+            TaskError: an environment whose episode was ended early has no end of its own.
         """
         waits = self._waited > 0
         self.is_begun = is_over if self.is_same_step else self._begins
@@ -51,7 +53,7 @@ class AutoresetRows:
         self._begins = is_over & ~self.is_begun
         self._waited = np.where(waits & ~self.is_begun, self._waited + 1, 0)
         if (self._waited > WAIT_STEPS).any():
-            raise ValueError(
+            raise TaskError(
                 f"{self._name}: an episode that was ended early has gone on for {WAIT_STEPS} steps: the environment "
                 "needs an end of its own, or autoreset_mode Disabled"
             )
@@ -74,13 +76,13 @@ class AutoresetRows:
             is_over: these rows.
 
         Raises:
-            ValueError: one is missing.
+            TaskError: one is missing.
         """
         final = info.get("final_obs")
         if final is not None and not (isinstance(final, np.ndarray) and final.dtype == object):
             final = list(iterate(self._envs.observation_space, final))
         each = [None if final is None else final[i] for i in np.flatnonzero(is_over)]
         if any(observation is None for observation in each):
-            raise ValueError(f"{self._name}: an episode has ended without a final_obs in info, which SAME_STEP needs")
+            raise TaskError(f"{self._name}: an episode has ended without a final_obs in info, which SAME_STEP needs")
         batch: Any = create_empty_array(self._envs.single_observation_space, len(each))
         return concatenate(self._envs.single_observation_space, each, batch)

@@ -7,23 +7,26 @@ skipped (`NEXT_STEP`). An environment's own state cannot be saved: a run that is
 """
 
 import ast
+import os
+import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import gymnasium
 import numpy as np
-from gymnasium.envs.registration import EnvSpec, load_env_creator
-from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from numpy.typing import NDArray
 from pydantic import ConfigDict, model_validator
 
-from policies.tasks.catalogue import GYM, UnknownTask, import_users_module
+from policies.tasks.catalogue import GYM, UnknownTask
 from policies.tasks.episode import Outcome
 from policies.tasks.gym_autoreset import AutoresetRows
+from policies.tasks.gym_making import Vectorization, close_envs, is_vector, make_envs, renders, spec_of
 from policies.tasks.gym_spaces import ActionWriter, ObservationReader, UnfitSpace
 from policies.tasks.layout import Layout
 from policies.tasks.reshaping import Rows
 from policies.tasks.task import Task, TaskSettings
+from policies.tasks.task_error import TaskError
 
 _SUCCESS_KEYS = ("is_success", "success")  # of an info: Stable-Baselines3 and Gymnasium-Robotics; Meta-World
 _IMAGES_PER_S = 30  # of environments that do not say (guess)
@@ -38,9 +41,14 @@ class GymSettings(TaskSettings):
 
     preset: Literal[""] = ""  # type: ignore[assignment]  # there are none
     """There are none."""
-    vectorization: Literal["sync", "async", "vector_entry_point"] = "sync"
+    vectorization: Vectorization = "sync"
     """Whether environments are stepped one after the other, each in a process of its own, or all by the vector
     environment that is registered for them (of an ID that has nothing else, always so)."""
+
+    @property
+    def env_count_max(self) -> int | None:
+        """Processes: no more than there are cores."""
+        return len(os.sched_getaffinity(0)) if self.vectorization == "async" else None
 
     @model_validator(mode="before")
     @classmethod
@@ -76,9 +84,13 @@ class GymTask(Task):
         Raises:
             UnknownTask: they cannot be made, or no policy here can see them or act in them.
         """
+        if not hasattr(self, "env_id"):
+            raise UnknownTask(f"{type(self).__name__}: names no env_id, the ID of its environments")
         name = f"{GYM}{self.env_id}"
-        spec = _spec(self.env_id)
-        self.envs: VectorEnv[Any, Any, Any] = _made(spec, env_count, settings)
+        spec, vectorization = spec_of(self.env_id), settings.vectorization
+        self.envs: VectorEnv[Any, Any, Any] = make_envs(spec, env_count, vectorization, settings.model_extra or {})
+        self._can_hold = not is_vector(spec, vectorization)
+        self._close_envs = weakref.finalize(self, close_envs, self.envs)  # at the latest when the program ends
         try:
             self._reader = ObservationReader(self.envs.single_observation_space)
             self._writer = ActionWriter(self.envs.single_action_space)
@@ -91,19 +103,38 @@ class GymTask(Task):
         )
         super().__init__(layout, env_count, number_defaults={}, device=device)
         self._seeds: list[int | None] = [None] * env_count
+        self._is_held: NDArray[np.bool_] | None = None
         waits = self.envs.metadata["autoreset_mode"] is AutoresetMode.DISABLED
         self._autoreset = None if waits else AutoresetRows(name, self.envs)
 
     @property
     def is_skipped(self) -> NDArray[np.bool_] | None:
-        """Where the last step was no decision: of environments that begin episodes by themselves."""
-        return None if self._autoreset is None else self._autoreset.is_skipped
+        """Where the last step was no decision: of environments that begin episodes by themselves, or are held."""
+        return self._is_held if self._autoreset is None else self._autoreset.is_skipped
 
     def reset(self, seed: int | Sequence[int], is_chosen: NDArray[np.bool_] | None = None) -> None:
         """Starts environments anew; of a single seed each has the next one."""
         seeds = [seed + i for i in range(self.env_count)] if isinstance(seed, int) else seed
-        self._seeds = [each % 2**31 for each in seeds]
+        chosen = np.ones(self.env_count, dtype=np.bool_) if is_chosen is None else is_chosen
+        pairs = zip(seeds, self._seeds, chosen, strict=True)
+        self._seeds = [new % 2**31 if is_new else old for new, old, is_new in pairs]
         super().reset(seed, is_chosen)
+
+    def step_others(self, is_held: NDArray[np.bool_]) -> None:
+        """As every task's, but what only a vector environment steps begins another episode: it steps all."""
+        if not self._can_hold:
+            self.step()
+            self.begin(is_held)
+            return
+        singles: Any = self.envs
+        singles.set_attr("is_held", is_held.tolist())
+        self._is_held = is_held
+        super().step_others(is_held)
+        self._is_held = None
+
+    def close(self) -> None:
+        """Closes the environments, and ends their processes."""
+        self._close_envs()
 
     def _launch_begin(self, is_chosen: NDArray[np.bool_]) -> None:
         """Resets the chosen environments and shows their first frames."""
@@ -123,6 +154,7 @@ class GymTask(Task):
             autoreset.step(is_terminated | is_truncated)
             is_begun, is_decided = autoreset.is_begun, ~autoreset.is_skipped
         rows.of("rewards")[:] = np.where(is_decided, rewards, 0.0)
+        self._check_finite(rows.of("rewards"), "a reward is")
         if autoreset is not None and autoreset.is_same_step and is_begun.any():
             self._show(rows, ~is_begun, observations)
             is_final = is_begun & is_decided
@@ -219,11 +251,14 @@ class GymTask(Task):
             shown[is_chosen, : older.shape[1]] = older
             first = shown.shape[1] - size
             frames = self._reader.floats(observations)[which]
-            if not np.isfinite(frames).all():
-                raise ValueError(f"{self.layout.task}: an observation holds a number that is not finite")
+            self._check_finite(frames, "an observation holds a number that is")
             shown[is_chosen, first : first + own] = frames
         if self._reader.image is not None:
             rows.of("images")[is_chosen] = self._reader.images(observations)[which]
+
+    def _check_finite(self, values: NDArray[Any], what: str) -> None:
+        if not np.isfinite(values).all():  # one of them would make NaN of all weights
+            raise TaskError(f"{self.layout.task}: {what} not finite")
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Restores the arrays; the environments begin new episodes, seeded by how many there have been."""
@@ -237,11 +272,17 @@ class GymTask(Task):
 
     def top_view(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:  # noqa: ARG002
         """What the environment renders, RGB; of any height."""
-        envs = self.envs.envs[i_env : i_env + 1] if isinstance(self.envs, SyncVectorEnv) else None
-        images = [env.render() for env in envs] if envs is not None else self.envs.render()
-        if images is None or images[0] is None:
-            raise NotImplementedError(f"{self.layout.task} renders no rgb_array")
-        return np.asarray(images[0 if envs is not None else i_env], dtype=np.uint8)
+        try:
+            if isinstance(self.envs, SyncVectorEnv):
+                image = self.envs.envs[i_env].render()
+            else:
+                images: Any = self.envs.render() if renders(self.envs) else None
+                image = None if images is None else images[i_env]
+        except NotImplementedError:
+            image = None
+        if image is None:
+            raise NotImplementedError(f"{self.layout.task}: renders no rgb_array")
+        return np.asarray(image, dtype=np.uint8)
 
 
 def gym_class(env_id: str) -> type[GymTask]:
@@ -250,54 +291,5 @@ def gym_class(env_id: str) -> type[GymTask]:
     Raises:
         UnknownTask: nothing of that ID is registered.
     """
-    _spec(env_id)
+    spec_of(env_id)
     return type("GymTask", (GymTask,), {"env_id": env_id})
-
-
-def _spec(env_id: str) -> EnvSpec:
-    """What is registered of an ID; of `module:ID` by importing the module."""
-    module, _, own_id = env_id.rpartition(":")
-    if module:
-        import_users_module(f"{GYM}{env_id}", module)
-    try:
-        return gymnasium.spec(own_id)
-    except gymnasium.error.Error as error:
-        raise UnknownTask(f"{GYM}{env_id}: {_one_line(error)}") from None
-
-
-def _made(spec: EnvSpec, env_count: int, settings: GymSettings) -> VectorEnv[Any, Any, Any]:
-    name = f"{GYM}{spec.id}"
-    arguments = dict(settings.model_extra or {})
-    is_vector = spec.entry_point is None or settings.vectorization == "vector_entry_point"
-    entry_point = spec.vector_entry_point if is_vector else spec.entry_point
-    if "render_mode" not in arguments and "rgb_array" in _render_modes(name, entry_point):
-        arguments["render_mode"] = "rgb_array"
-    if is_vector:
-        made = _called(name, lambda: gymnasium.make_vec(spec, env_count, "vector_entry_point", **arguments))
-        envs: VectorEnv[Any, Any, Any] = made
-        if not isinstance(envs.metadata.get("autoreset_mode"), AutoresetMode):
-            raise UnknownTask(
-                f"{name}: is a vector environment that does not say when it begins episodes: its metadata need an "
-                "autoreset_mode"
-            )
-        return envs
-    makers = [lambda: gymnasium.make(spec, **arguments)] * env_count
-    kind = SyncVectorEnv if settings.vectorization == "sync" else AsyncVectorEnv
-    return _called(name, lambda: kind(makers, autoreset_mode=AutoresetMode.DISABLED))
-
-
-def _render_modes(name: str, at: Any) -> Sequence[str]:
-    creator = _called(name, lambda: load_env_creator(at)) if isinstance(at, str) else at
-    return getattr(creator, "metadata", {}).get("render_modes", ())
-
-
-def _called(name: str, make: Any) -> Any:
-    """What Gymnasium makes; what it or the environment's constructor will not take is told in one sentence."""
-    try:
-        return make()
-    except (gymnasium.error.Error, ImportError, TypeError, ValueError, AssertionError) as error:
-        raise UnknownTask(f"{name}: cannot be made: {_one_line(error)}") from None
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split()).rstrip(".")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from policies.tasks.episode import OUTCOME_COUNT, Outcome
 from policies.tasks.layout import Element, Layout
+from policies.tasks.task_error import TaskError
 
 Array = NDArray[Any]
 
@@ -81,9 +82,9 @@ class Reshaping:
         if was_over.any():
             rows.of("final_observations")[was_over] = self._add(rows.of("final_observations")[was_over])
         decision = self._decision(rows, was_over)
-        judged = _column(task.outcome(decision), decision.outcomes, "outcome")
+        judged = _outcomes(task.outcome(decision), decision.outcomes)
         outcomes = np.where(was_over & (judged == Outcome.RUNNING), decision.outcomes, judged)  # ended is ended
-        rewards = _column(task.reward(replace(decision, outcomes=outcomes)), decision.rewards, "reward")
+        rewards = _rewards(task.reward(replace(decision, outcomes=outcomes)), decision.rewards)
         if task.is_skipped is not None:  # what was no decision neither ends nor pays
             outcomes = np.where(task.is_skipped, Outcome.RUNNING, outcomes)
             rewards = np.where(task.is_skipped, np.float32(0.0), rewards)
@@ -106,11 +107,10 @@ class Reshaping:
         if task.added:
             frames = observations[:, size - task.layout.frame_size : size - len(task.added)]
             added = np.asarray(task.observe(frames))
-            if added.shape != (len(frames), len(task.added)):
-                raise ValueError(
-                    f"observe: must return an array of shape {(len(frames), len(task.added))}, not {added.shape}"
-                )
+            _check_numbers(added, (len(frames), len(task.added)), "observe")
             observations[:, size - len(task.added) :] = added
+            if not np.isfinite(observations[:, size - len(task.added) :]).all():
+                raise TaskError("observe: must return finite numbers")
         return observations
 
 
@@ -177,13 +177,36 @@ def cut_rows(task: Reshaped, is_cut: Array) -> None:
     task.begin(is_cut)
 
 
-def _column(values: Any, like: Array, method: str) -> Array:
-    """What a method of a subclass returned, one value per row.
+def _outcomes(values: Any, like: Array) -> Array:
+    """What `outcome` of a subclass returned: an `Outcome` number per row.
 
     Raises:
-        ValueError: it has another shape.
+        TaskError: it is something else.
     """
-    column = np.asarray(values)
-    if column.shape != like.shape:
-        raise ValueError(f"{method}: must return an array of shape {like.shape}, not {column.shape}")
-    return column.astype(like.dtype)
+    outcomes = np.asarray(values)
+    _check_numbers(outcomes, like.shape, "outcome")
+    wrong = outcomes[~np.isin(outcomes, range(OUTCOME_COUNT))]
+    if wrong.size:
+        raise TaskError(f"outcome: must return Outcome numbers, 0 to {OUTCOME_COUNT - 1}, not {wrong[0]}")
+    return outcomes.astype(like.dtype)
+
+
+def _rewards(values: Any, like: Array) -> Array:
+    """What `reward` of a subclass returned: a number per row.
+
+    Raises:
+        TaskError: it is something else, or not finite: one such reward would make NaN of all weights.
+    """
+    rewards = np.asarray(values)
+    _check_numbers(rewards, like.shape, "reward")
+    rewards = rewards.astype(like.dtype)
+    if not np.isfinite(rewards).all():
+        raise TaskError("reward: must return finite numbers")
+    return rewards
+
+
+def _check_numbers(values: Array, shape: tuple[int, ...], method: str) -> None:
+    if values.shape != shape:
+        raise TaskError(f"{method}: must return an array of shape {shape}, not {values.shape}")
+    if values.dtype.kind not in "biuf":
+        raise TaskError(f"{method}: must return numbers, not {values.dtype}")

@@ -24,6 +24,7 @@ from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Outcome, StepBu
 from policies.tasks.goals import PositionGoal
 from policies.tasks.layout import Element, Layout
 from policies.tasks.reshaping import Array, Decision, Reshaping
+from policies.tasks.task_error import TaskError
 from policies.tasks.task_params import NumberError, Sampler, TaskParam, TaskParamTable
 
 Preset = Literal["as-documented", "as-coded", "improved"]
@@ -47,6 +48,11 @@ class TaskSettings(BaseModel):
     there are worlds, paths, noise and starts also of these."""
     stack: int = Field(default=0, ge=0, le=50)
     """Observations in a stack; 0: as the preset has it."""
+
+    @property
+    def env_count_max(self) -> int | None:
+        """How many environments are worth having side by side, where nobody has said how many; None: any."""
+        return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,13 +212,16 @@ class Task:
         """What `step` does of the task's own."""
         self._step.launch()
 
-    def observe(self, frames: Array) -> Array:
+    def observe(self, frames: Array) -> Array:  # noqa: ARG002  (what subclasses take)
         """The values of the `added` elements, shape (rows, added).
 
         Args:
             frames: what the task shows without them, shape (rows, elements).
+
+        Raises:
+            TaskError: there are `added` elements, and the subclass has no such method.
         """
-        raise NotImplementedError(f"{type(self).__name__}: elements are added, but there is no method observe")
+        raise TaskError(f"{type(self).__name__}: elements are added, but there is no method observe")
 
     def outcome(self, decision: Decision) -> Array:
         """How each episode stands, shape (envs,): `Outcome` numbers. An end of the task's own stays an end."""
@@ -226,6 +235,9 @@ class Task:
         """Keeps the images of the episodes that just ended; to be called before those of the next ones are drawn."""
         image_rows = (self.env_count, self.layout.image_shape[0])
         wp.launch(keep_last_image_rows, image_rows, [self.buffers], device=self.device)
+
+    def close(self) -> None:
+        """Gives back what it holds besides memory: nothing, but where environments run elsewhere."""
 
     def set_params(self, values: Mapping[str, float | Sampler]) -> None:
         """Sets or randomises numbers from the next episodes on (domain randomisation, curricula).

@@ -5,6 +5,7 @@ an episode starts, from the samplers below, so any parameter can be randomised b
 Sampler kinds are ML-Agents': constant, uniform, multirangeuniform, gaussian.
 """
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -89,8 +90,7 @@ class TaskParamTable:
             number = self.declarations.get(name)
             if number is None:
                 raise NumberError(f"{name}: this task has no such number; it has {', '.join(self.names)}")
-            sampler = value if isinstance(value, Sampler) else Sampler.constant(float(value))
-            self._write(self.names.index(name), number, sampler)
+            self._write(self.names.index(name), number, _sampler(name, value))
         self._device.assign(self.rows)
 
     def keep_as_own(self) -> None:
@@ -106,6 +106,10 @@ class TaskParamTable:
         }
 
     def _write(self, k: int, number: TaskParam, sampler: Sampler) -> None:
+        if any(len(interval) != 2 for interval in sampler.intervals):
+            raise NumberError(f"{number.name}: an interval is a pair of numbers")
+        if not 0.0 <= sampler.st_dev < math.inf:
+            raise NumberError(f"{number.name}: st_dev: must be at least 0 and finite, not {sampler.st_dev}")
         ends = [end for interval in sampler.intervals for end in interval] or [sampler.mean]
         wrong = [end for end in ends if not number.minimum <= end <= number.maximum]
         if wrong:
@@ -124,6 +128,15 @@ class TaskParamTable:
         else:
             row[0] = _GAUSSIAN
             row[_FIRST], row[_FIRST + 1] = sampler.mean, sampler.st_dev
+
+
+def _sampler(name: str, value: float | Sampler) -> Sampler:
+    if isinstance(value, Sampler):
+        return value
+    try:
+        return Sampler.constant(float(value))
+    except (TypeError, ValueError):
+        raise NumberError(f"{name}: must be a number, or what it is drawn from, not {value!r}") from None
 
 
 def _text(row: np.ndarray[Any, Any]) -> str:

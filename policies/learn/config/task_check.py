@@ -5,7 +5,7 @@ begins; every lesson is looked at, so that none is refused hours later.
 """
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 from policies.learn.algorithms.teacher import load_teacher
 from policies.learn.config.behavior import Behavior, DaggerHyperparameters, PpoHyperparameters
@@ -33,11 +33,12 @@ def check_against_task(loaded: Loaded) -> None:
         task_settings(name, {})
     with _refused_at(loaded, "env_settings", "env_args"):
         task = build_task(name, 1, settings_of(name, loaded.config.env_settings.env_args))
-    for loc, sentence in _unseen(loaded.config.behavior, task.layout):
-        raise loaded.error(("behaviors", loaded.config.behavior_name, *loc), sentence)
-    _check_params(loaded, task)
-    _check_demonstrations(loaded, task)
-    _check_teacher(loaded, task)
+    with closing(task):
+        for loc, sentence in _unseen(loaded.config.behavior, task.layout):
+            raise loaded.error(("behaviors", loaded.config.behavior_name, *loc), sentence)
+        _check_params(loaded, task)
+        _check_demonstrations(loaded, task)
+        _check_teacher(loaded, task)
 
 
 def _unseen(behavior: Behavior, layout: Layout) -> Iterator[tuple[tuple[str, ...], str]]:

@@ -1,17 +1,21 @@
 """`honeyguide train`, `eval`, `play` and `export` on tasks of the user's own and on environments of Gymnasium."""
 
+import multiprocessing
+import os
 import re
 import shlex
 import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import onnxruntime
 import pytest
 import yaml
 
 from policies.learn.config import recipes
+from policies.learn.evaluate import evaluate
 from policies.learn.export.policy_file import load_policy
 from policies.tasks import catalogue
 from tests.documents import ROOT, blocks
@@ -62,6 +66,41 @@ class Lights(gymnasium.Env):
 
 gymnasium.register("Lights-v0", entry_point=Lights)
 """
+FAULTS = """
+import numpy as np
+
+from lights import Lights, gymnasium
+from policies.tasks.gym_task import GymTask
+from policies.tasks.layout import Element
+from policies.tasks.roller_ball import RollerBall
+
+
+class Unpaid(Lights):
+    def step(self, action):
+        seen, _, *rest = super().step(action)
+        return seen, np.nan, *rest
+
+
+class NanPaid(RollerBall):
+    def reward(self, decision):
+        return decision.rewards * np.nan
+
+
+class NoSuchOutcome(RollerBall):
+    def outcome(self, decision):
+        return np.full(len(decision.rewards), 42)
+
+
+class Unobserved(RollerBall):
+    added = (Element("distance", "m"),)
+
+
+class Nameless(GymTask):
+    pass
+
+
+gymnasium.register("Unpaid-v0", entry_point=Unpaid, disable_env_checker=True)
+"""
 FEW = {"hyperparameters": {"batch_size": 128, "buffer_size": 512}, "network_settings": {"hidden_units": 16}}
 
 
@@ -72,7 +111,10 @@ def own_module(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "own_tasks.py").write_text(MODULE)
     yield
-    sys.modules.pop("own_tasks", None)
+    for module in ("own_tasks", "lights", "faults"):
+        sys.modules.pop(module, None)
+    for env_id in ("Lights-v0", "Unpaid-v0"):
+        gymnasium.registry.pop(env_id, None)
 
 
 def config(max_steps=1000, network=None, **settings):
@@ -239,4 +281,56 @@ def test_a_task_without_a_view_is_told_before_a_film_is_begun():
     result = honeyguide("play", "own_tasks:Unseen", "--random", "--mp4", "a.mp4")
     assert result.exit_code == 2
     assert "Unseen: draws no view of itself" in result.stderr
+    assert not Path("a.mp4").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--gym", "faults:Unpaid-v0"), "gym:faults:Unpaid-v0: a reward is not finite"),
+        (("--env", "faults:NanPaid"), "reward: must return finite numbers"),
+        (("--env", "faults:NoSuchOutcome"), "outcome: must return Outcome numbers, 0 to 8, not 42"),
+        (("--env", "faults:Unobserved"), "Unobserved: elements are added, but there is no method observe"),
+        (("--env", "faults:Nameless"), "Nameless: names no env_id, the ID of its environments"),
+        (("--gym", "FrozenLake-v1", "--env-args", "map_name=9x9"), "gym:FrozenLake-v1: cannot be made: KeyError"),
+    ],
+)
+def test_faults_of_tasks_of_ones_own_end_a_training_with_one_sentence(words, says):
+    Path("lights.py").write_text(LIGHTS, encoding="utf-8")
+    Path("faults.py").write_text(FAULTS, encoding="utf-8")
+    result = honeyguide("train", config(600, {"vis_encode_type": "compact"}), *words, "--run-id", "faulty")
+    assert result.exit_code == 2, result.output
+    assert says in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert not Path("results/faulty/Own.pt").exists()
+
+
+def test_processes_are_ended_with_what_they_were_made_for(capfd):
+    pole = ("--gym", "CartPole-v1", "--env-args", "vectorization=async")
+    trained(config(512, num_areas=2), *pole, "--run-id", "pole")
+    assert not multiprocessing.active_children()
+    most = []
+    policy, card = load_policy(Path("results/pole/Own.pt"))
+    settings = catalogue.settings_of(card.task, [], card.settings)
+    evaluate(
+        policy,
+        card.task,
+        settings,
+        episodes=20,
+        seed=1,
+        progress=lambda _: most.append(len(multiprocessing.active_children())),
+    )
+    assert max(most) == min(20, len(os.sched_getaffinity(0)))
+    assert not multiprocessing.active_children()
+    result = honeyguide("play", "gym:CartPole-v1", "--env-args", "vectorization=async", "--random", "--mp4", "a.mp4")
+    assert result.exit_code == 0, result.output
+    assert not multiprocessing.active_children()
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_an_environment_that_renders_nothing_is_told_before_a_film_is_begun():
+    Path("lights.py").write_text(LIGHTS, encoding="utf-8")
+    result = honeyguide("play", "gym:lights:Lights-v0", "--random", "--mp4", "a.mp4")
+    assert result.exit_code == 2
+    assert "gym:lights:Lights-v0: renders no rgb_array" in result.stderr
     assert not Path("a.mp4").exists()

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import re
 
 import gymnasium
 import numpy as np
@@ -13,8 +14,10 @@ from gymnasium.wrappers.vector import NormalizeObservation, NormalizeReward, Rec
 
 import policies  # noqa: F401  (registers the tasks)
 from policies.tasks.catalogue import CATALOGUE, UnknownTask, settings_class
+from policies.tasks.episode import Outcome
 from policies.tasks.gym import TaskEnv, TaskVectorEnv
-from policies.tasks.task_params import NumberError
+from policies.tasks.gym_task import GymTask
+from policies.tasks.task_params import NumberError, Sampler
 
 ENVS = 5
 SHORT = {"step_limit": (6.0, 12.0)}
@@ -56,6 +59,75 @@ def test_a_batch_does_what_gymnasiums_batch_of_single_environments_does(name, se
     assert ends > ENVS
 
 
+class Pole(GymTask):
+    env_id = "CartPole-v1"
+
+
+class ShortPole(GymTask):
+    """Ends at once where the cart begins on the right: in a row that is held, too."""
+
+    env_id = "CartPole-v1"
+
+    def outcome(self, decision):
+        return np.where(decision.next_observations[:, -4] > 0.03, Outcome.LOST, decision.outcomes)
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize("task", [Pole, ShortPole])
+@pytest.mark.parametrize("settings", [{"stack": 2}, {"max_episode_steps": 7}])
+def test_environments_of_gymnasium_in_a_batch_do_what_gymnasiums_batch_does(task, settings, mode):
+    theirs = SyncVectorEnv([lambda: TaskEnv(task, **settings)] * 3, autoreset_mode=mode)
+    ours = TaskVectorEnv(task, 3, autoreset_mode=mode, **settings)
+    seeds, ends = [1, 2, 3], 0
+    assert np.array_equal(theirs.reset(seed=seeds)[0], ours.reset(seed=seeds)[0])
+    for actions in actions_of(theirs, 2, 80):
+        there, here = theirs.step(actions), ours.step(actions)
+        for one, other in zip(there[:4], here[:4], strict=True):
+            assert np.array_equal(one, other)
+        is_over = here[2] | here[3]
+        ends += is_over.sum()
+        if mode is AutoresetMode.DISABLED and is_over.any():
+            observations, _ = theirs.reset(options={"reset_mask": is_over})
+            assert np.array_equal(observations, ours.reset(options={"reset_mask": is_over})[0])
+    assert ends > 6
+
+
+def test_environments_in_processes_are_held_too():
+    ours = TaskVectorEnv(Pole, 2, autoreset_mode="NextStep", vectorization="async")
+    theirs = SyncVectorEnv([lambda: TaskEnv(Pole)] * 2, autoreset_mode=AutoresetMode.NEXT_STEP)
+    try:
+        assert np.array_equal(theirs.reset(seed=[1, 2])[0], ours.reset(seed=[1, 2])[0])
+        for _ in range(30):
+            assert np.array_equal(theirs.step(np.ones(2, dtype=int))[0], ours.step(np.ones(2, dtype=int))[0])
+    finally:
+        ours.close()
+
+
+def test_what_a_vector_environment_steps_begins_another_episode_with_the_step_after_its_end():
+    arguments = {"task": "RollerBall", "autoreset_mode": "Disabled", "numbers": {"step_limit": 3}}
+    gymnasium.register("Batch-v0", vector_entry_point=TaskVectorEnv, kwargs=arguments)
+    try:
+        envs = TaskVectorEnv("gym:Batch-v0", 2, autoreset_mode="NextStep")
+    finally:
+        gymnasium.registry.pop("Batch-v0")
+    envs.reset(seed=1)
+    seen = [envs.step(np.zeros((2, 2))) for _ in range(8)]
+    assert [bool(step[3].all()) for step in seen] == [False, False, True, False, False, False, True, False]
+    assert not seen[3][1].any()
+    assert not np.array_equal(seen[3][0], seen[2][0])
+
+
+@pytest.mark.parametrize("make", [lambda **how: TaskEnv(Pole, **how), lambda **how: TaskVectorEnv(Pole, 2, **how)])
+def test_closing_it_closes_what_runs_elsewhere(make):
+    env = make(vectorization="async")
+    env.reset(seed=1)
+    processes = env.task.envs.processes
+    assert all(process.is_alive() for process in processes)
+    env.close()
+    assert not any(process.is_alive() for process in processes)
+    env.close()
+
+
 def test_what_flies_begins_with_the_step_after_its_end_too():
     envs = TaskVectorEnv("Hover", 3, autoreset_mode="NextStep", has_estimator="false", numbers={"step_limit": 3})
     envs.reset(seed=1)
@@ -82,6 +154,31 @@ def test_one_seed_gives_the_same_batch_again():
     first, _ = envs.reset(seed=5)
     assert not np.array_equal(envs.reset()[0], first)
     assert np.array_equal(envs.reset(seed=5)[0], first)
+
+
+@pytest.mark.parametrize("name", ["RollerBall", Pole])
+def test_seeds_are_dealt_out_and_carried_on_as_by_gymnasiums_batch(name):
+    """One seed, a list with gaps, none, and masks with each of these."""
+    theirs = SyncVectorEnv([lambda: TaskEnv(name)] * 3, autoreset_mode=AutoresetMode.DISABLED)
+    ours = TaskVectorEnv(name, 3, autoreset_mode="Disabled")
+    everyone, first = np.ones(3, dtype=bool), np.array([True, False, False])
+    resets = [
+        (5, None),
+        (None, None),
+        ([1, 2, 3], None),
+        (None, None),
+        (5, everyone),
+        ([9, None, None], first),
+        (None, ~first),
+        (None, None),
+        ([4, None, 4], None),
+        (None, everyone),
+    ]
+    for seed, mask in resets:
+        seen = [
+            envs.reset(seed=seed, options=None if mask is None else {"reset_mask": mask})[0] for envs in (theirs, ours)
+        ]
+        assert np.array_equal(*seen), (seed, mask)
 
 
 def test_a_reset_mask_begins_its_rows_and_leaves_the_others():
@@ -167,6 +264,141 @@ def test_a_task_without_a_limit_is_cut_alone_and_in_a_batch():
     assert info["_final_obs"].all()
     assert not np.array_equal(info["final_obs"], turn[-1][1][0])
     assert envs.unwrapped.task.take_scores().length_sum == 60
+
+
+def test_minus_one_is_no_limit_and_other_limits_below_one_are_refused():
+    envs = gymnasium.make_vec("honeyguide/Parking1-v0", num_envs=2, max_episode_steps=-1)
+    envs.reset(seed=1)
+    assert not any(envs.step(np.zeros(2, dtype=int))[3].any() for _ in range(5))
+    for limit in (0, -2):
+        with pytest.raises(
+            NumberError, match=f"max_episode_steps: must be at least 1, or -1 for no limit, not {limit}"
+        ):
+            TaskVectorEnv("Parking1", 2, max_episode_steps=limit)
+
+
+def test_an_end_by_gymnasiums_limit_is_named_in_a_batch_alone():
+    """`make` cuts an episode outside of the environment, which cannot say so."""
+    env = gymnasium.make("honeyguide/RollerBall-v0", max_episode_steps=1)
+    envs = gymnasium.make_vec("honeyguide/RollerBall-v0", num_envs=1, max_episode_steps=1)
+    env.reset(seed=1)
+    envs.reset(seed=1)
+    assert env.step(np.zeros(2, dtype=np.float32))[3:] == (True, {})
+    *_, is_truncated, info = envs.step(np.zeros((1, 2)))
+    assert (bool(is_truncated[0]), info["outcome"].tolist()) == (True, [Outcome.TIMEOUT])
+
+
+@pytest.mark.parametrize(
+    ("name", "action", "says"),
+    [
+        ("RollerBall", 0.5, r"action: must have shape \(2,\), not \(\)"),
+        ("RollerBall", [1.0], r"action: must have shape \(2,\), not \(1,\)"),
+        ("RollerBall", [[1.0, 1.0]], r"action: must have shape \(2,\), not \(1, 2\)"),
+        ("RollerBall", ["a", "b"], "action: must be numbers, not <U1"),
+        ("Parking1", 1.7, "action: must be whole numbers, not float64"),
+        ("Parking1", np.nan, "action: must be whole numbers, not float64"),
+        ("Parking1", [0, 1], r"action: must have shape \(\), not \(2,\)"),
+        ("Parking2", 1, r"action: must have shape \(2,\), not \(\)"),
+    ],
+)
+def test_actions_of_another_shape_or_kind_are_refused(name, action, says):
+    env = TaskEnv(name)
+    env.reset(seed=1)
+    with pytest.raises(ValueError, match=says):
+        env.step(action)
+
+
+@pytest.mark.parametrize(
+    ("name", "count", "shape", "expected"),
+    [
+        ("RollerBall", 2, (2,), "(2, 2)"),
+        ("RollerBall", 4, (2,), "(4, 2)"),
+        ("RollerBall", 4, (4, 1), "(4, 2)"),
+        ("RollerBall", 2, (3, 2), "(2, 2)"),
+        ("Parking1", 2, (3,), "(2,)"),
+        ("Parking2", 3, (2, 3), "(3, 2)"),
+    ],
+)
+def test_actions_of_a_batch_are_not_stretched(name, count, shape, expected):
+    envs = TaskVectorEnv(name, count)
+    envs.reset(seed=1)
+    with pytest.raises(ValueError, match=re.escape(f"action: must have shape {expected}, not {shape}")):
+        envs.step(np.zeros(shape, dtype=int))
+
+
+def test_the_choice_of_one_branch_may_have_an_axis_of_its_own():
+    env, envs = TaskEnv("Parking1"), TaskVectorEnv("Parking1", 2)
+    env.reset(seed=1)
+    envs.reset(seed=1)
+    for action in (1, [1], np.int64(1), np.array([1], dtype=np.uint8)):
+        env.step(action)
+        envs.step(np.stack([action, action]))
+        assert envs.task.buffers.branches.numpy().tolist() == [[1], [1]]
+
+
+@pytest.mark.parametrize(
+    ("value", "says"),
+    [
+        ((1, 2, 3), r"mass_kg: a range is a pair of numbers, not \(1, 2, 3\)"),
+        ((1,), r"mass_kg: a range is a pair of numbers, not \(1,\)"),
+        (("a", "b"), "mass_kg: a range is a pair of numbers"),
+        ("heavy", "mass_kg: must be a number, or what it is drawn from, not 'heavy'"),
+        (None, "mass_kg: must be a number, or what it is drawn from, not None"),
+        (np.array([1.0, 2.0]), "mass_kg: must be a number, or what it is drawn from"),
+        (Sampler(mean=1.0, st_dev=-1.0), "mass_kg: st_dev: must be at least 0 and finite, not -1.0"),
+        (Sampler(mean=1.0, st_dev=np.nan), "mass_kg: st_dev: must be at least 0 and finite, not nan"),
+        (Sampler(mean=1.0, st_dev=np.inf), "mass_kg: st_dev: must be at least 0 and finite, not inf"),
+        (Sampler(intervals=((1.0,),)), "mass_kg: an interval is a pair of numbers"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused(value, says):
+    with pytest.raises(NumberError, match=says):
+        TaskEnv("RollerBall", numbers={"mass_kg": value})
+
+
+def test_numbers_are_a_dictionary():
+    with pytest.raises(NumberError, match="numbers: must be a dictionary"):
+        TaskEnv("RollerBall", numbers=["mass_kg"])
+
+
+def test_a_reset_leaves_the_info_of_the_last_step_as_it_was():
+    envs = TaskVectorEnv("RollerBall", 2, autoreset_mode="Disabled", numbers={"step_limit": 1})
+    envs.reset(seed=1)
+    *_, info = envs.step(np.zeros((2, 2)))
+    envs.reset(options={"reset_mask": np.array([True, False])})
+    assert info["_outcome"].tolist() == [True, True]
+
+
+def test_a_batch_says_at_which_rate_it_is_rendered():
+    assert TaskVectorEnv("RollerBall", 2).metadata["render_fps"] == TaskEnv("RollerBall").metadata["render_fps"] == 5
+
+
+def test_last_observations_with_parts_are_those_of_gymnasiums_batch():
+    settings = {"has_estimator": False, "image_size": 8, "has_privileged": True}
+    ours = TaskVectorEnv("FollowMe", 2, max_episode_steps=2, **settings)
+    theirs = SyncVectorEnv(
+        [lambda: gymnasium.wrappers.TimeLimit(TaskEnv("FollowMe", **settings), 2)] * 2,
+        autoreset_mode=AutoresetMode.SAME_STEP,
+    )
+    for envs in (ours, theirs):
+        envs.reset(seed=1)
+    for actions in actions_of(ours, 1, 2):
+        here, there = (envs.step(actions)[4] for envs in (ours, theirs))
+    assert here["final_obs"].dtype == there["final_obs"].dtype == object
+    assert [set(last) for last in here["final_obs"]] == [set(last) for last in there["final_obs"]]
+    assert np.array_equal(here["final_obs"][0]["image"], there["final_obs"][0]["image"])
+
+
+@pytest.mark.parametrize("make", [lambda: TaskEnv("RollerBall"), lambda: TaskVectorEnv("RollerBall", 2)])
+def test_a_copy_keeps_seed_and_generators_of_its_spaces(make):
+    env = make()
+    env.reset(seed=3)
+    env.action_space.seed(4)
+    env.action_space.sample()
+    for twin in (pickle.loads(pickle.dumps(env)), copy.deepcopy(env)):
+        original = copy.deepcopy(env)
+        assert twin.np_random_seed == 3
+        assert np.array_equal(twin.action_space.sample(), original.action_space.sample())
 
 
 @pytest.mark.parametrize("make", [lambda: TaskEnv("RollerBall"), lambda: TaskVectorEnv("RollerBall", 1)])

@@ -1,15 +1,28 @@
 """Environments of Gymnasium as tasks, held against Gymnasium's own stepping of them."""
 
+import gc
+import os
+import signal
+
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Text, Tuple, flatten
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from policies.tasks.catalogue import UnknownTask, build_task, file_stem, is_task_name, runs_code, settings_of
+from policies.tasks.catalogue import (
+    UnknownTask,
+    build_task,
+    file_stem,
+    is_task_name,
+    runs_code,
+    settings_of,
+    task_settings,
+)
 from policies.tasks.episode import Outcome
 from policies.tasks.gym_spaces import ActionWriter, ObservationReader, UnfitSpace
 from policies.tasks.gym_task import GymTask
+from policies.tasks.task_error import TaskError
 
 
 class Corridor(gymnasium.Env):
@@ -50,12 +63,44 @@ class Corridor(gymnasium.Env):
     def render(self):
         return np.full((20, 30, 3), 7, np.uint8)
 
+    def signals(self):
+        """Its process, the group of that, and what it does when it is interrupted or to end."""
+        handlers = tuple(signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP))
+        return os.getpid(), os.getpgrp(), handlers
+
+
+class Faulty(gymnasium.Env):
+    """Shows or pays in the third step what is not finite, or raises where it is made."""
+
+    observation_space = Box(-1, 1, (1,))
+    action_space = Discrete(2)
+
+    def __init__(self, seen=0.0, paid=0.0, raises=""):
+        self.seen, self.paid, self.steps = seen, paid, 0
+        if raises == "key":
+            raise KeyError("9x9")
+        if raises == "file":
+            raise FileNotFoundError(2, "No such file or directory", "map.txt")
+        if raises == "runtime":
+            raise RuntimeError("no display")
+
+    def reset(self, *, seed=None, options=None):  # noqa: ARG002  (as Gymnasium calls it)
+        super().reset(seed=seed)
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action):  # noqa: ARG002  (as Gymnasium calls it)
+        self.steps += 1
+        is_third = self.steps == 3
+        return np.full(1, self.seen if is_third else 0.0, np.float32), self.paid if is_third else 0.0, False, False, {}
+
 
 @pytest.fixture(autouse=True)
 def registered():
     gymnasium.register("Corridor-v0", entry_point=Corridor)
+    gymnasium.register("Faulty-v0", entry_point=Faulty, disable_env_checker=True)
     yield
     gymnasium.registry.pop("Corridor-v0")
+    gymnasium.registry.pop("Faulty-v0")
 
 
 @pytest.mark.parametrize("env_id", ["CartPole-v1", "Pendulum-v1", "FrozenLake-v1"])
@@ -151,6 +196,8 @@ def test_arguments_of_the_environment_are_settings():
         build_task("gym:Pendulum-v1", 1, settings_of("gym:Pendulum-v1", ["gravity=1.5"]))
     with pytest.raises(UnknownTask, match="vectorization: must be sync, async or vector_entry_point"):
         settings_of("gym:Pendulum-v1", ["vectorization=both"])
+    with pytest.raises(UnknownTask, match="gym:Pendulum-v1: preset: there are none, and no improved"):
+        settings_of("gym:Pendulum-v1", ["preset=improved"])
 
 
 def test_processes_do_what_one_does():
@@ -280,3 +327,96 @@ def test_names_say_whether_their_code_is_run():
     assert runs_code("gym:mine:CartPole-v1")
     assert runs_code("mine:Task")
     assert [file_stem(name) for name in ("gym:CartPole-v1", "a.b:MyTask")] == ["cart-pole-v1", "my-task"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"paid": np.nan}, "gym:Faulty-v0: a reward is not finite"),
+        ({"paid": -np.inf}, "gym:Faulty-v0: a reward is not finite"),
+        ({"seen": np.nan}, "gym:Faulty-v0: an observation holds a number that is not finite"),
+    ],
+)
+def test_what_is_not_finite_is_refused_before_anything_learns_from_it(arguments, says):
+    task = build_task("gym:Faulty-v0", 2, task_settings("gym:Faulty-v0", arguments))
+    task.reset(1)
+    task.step()
+    task.step()
+    with pytest.raises(TaskError, match=says):
+        task.step()
+
+
+@pytest.mark.parametrize(
+    ("raises", "says"),
+    [
+        ("key", "gym:Faulty-v0: cannot be made: KeyError: '9x9'"),
+        ("file", "gym:Faulty-v0: cannot be made: FileNotFoundError: .*map.txt"),
+        ("runtime", "gym:Faulty-v0: cannot be made: RuntimeError: no display"),
+    ],
+)
+def test_whatever_a_constructor_raises_is_told_in_one_sentence(raises, says):
+    with pytest.raises(UnknownTask, match=says):
+        build_task("gym:Faulty-v0", 1, settings_of("gym:Faulty-v0", [f"raises={raises}"]))
+
+
+def test_a_subclass_without_an_id_is_refused():
+    with pytest.raises(UnknownTask, match="Nameless: names no env_id"):
+        build_task(type("Nameless", (GymTask,), {}), 1)
+
+
+def test_processes_leave_signals_to_the_one_that_made_them():
+    before = signal.signal(signal.SIGTERM, lambda *_: None)
+    try:
+        task = build_task("gym:Corridor-v0", 2, settings_of("gym:Corridor-v0", ["vectorization=async"]))
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    try:
+        for pid, group, handlers in task.envs.call("signals"):
+            assert group == pid != os.getpid()
+            assert handlers == (signal.SIG_DFL,) * 3
+    finally:
+        task.close()
+
+
+def test_processes_end_with_the_task_that_nobody_has_closed():
+    task = build_task("gym:CartPole-v1", 2, settings_of("gym:CartPole-v1", ["vectorization=async"]))
+    processes = task.envs.processes
+    del task
+    gc.collect()
+    assert not any(process.is_alive() for process in processes)
+
+
+def test_closing_it_closes_each_environment():
+    closed = []
+    task = build_task("gym:Corridor-v0", 2)
+    for env in task.envs.envs:
+        env.unwrapped.close = lambda: closed.append(True)
+    task.close()
+    task.close()
+    assert closed == [True, True]
+
+
+@pytest.mark.parametrize("how", ["sync", "async"])
+def test_an_environment_that_renders_nothing_says_so(how):
+    task = build_task("gym:Faulty-v0", 2, settings_of("gym:Faulty-v0", [f"vectorization={how}"]))
+    task.reset(1)
+    try:
+        with pytest.raises(NotImplementedError, match="gym:Faulty-v0: renders no rgb_array"):
+            task.top_view(1)
+    finally:
+        task.close()
+
+
+def test_a_reset_of_some_rows_seeds_these_alone():
+    def third_starts():
+        task = build_task("gym:CartPole-v1", 3)
+        task.reset([1, 2, 3])
+        task.reset([9, 9, 9], np.array([True, False, False]))
+        task.begin(np.array([False, True, True]))
+        return task.buffers.observations.numpy().copy()
+
+    theirs = SyncVectorEnv([lambda: gymnasium.make("CartPole-v1")] * 3, autoreset_mode=AutoresetMode.DISABLED)
+    theirs.reset(seed=[1, 2, 3])
+    theirs.reset(seed=[9, None, None], options={"reset_mask": np.array([True, False, False])})
+    expected, _ = theirs.reset(options={"reset_mask": np.array([False, True, True])})
+    assert np.array_equal(third_starts(), expected)

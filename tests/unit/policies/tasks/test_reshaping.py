@@ -11,6 +11,7 @@ from policies.tasks.hover.hover import Hover
 from policies.tasks.layout import Element
 from policies.tasks.roller_ball import RollerBall
 from policies.tasks.task import TaskSettings
+from policies.tasks.task_error import TaskError
 
 EDGE_M = 4.5
 
@@ -173,6 +174,31 @@ def test_methods_that_return_something_else_are_told_so():
     task.reset(1)
     with pytest.raises(ValueError, match=r"reward: must return an array of shape \(3,\), not \(\)"):
         task.step()
-    with pytest.raises(NotImplementedError, match="Wordless: elements are added, but there is no method observe"):
+    with pytest.raises(TaskError, match="Wordless: elements are added, but there is no method observe"):
         Wordless(TaskSettings(), 3).reset(1)
     assert build_task("RollerBall", 1).layout.frame_size == 8
+
+
+@pytest.mark.parametrize(
+    ("method", "returned", "says"),
+    [
+        ("reward", np.ones((3, 1)), r"reward: must return an array of shape \(3,\), not \(3, 1\)"),
+        ("reward", np.array([0.0, np.nan, 0.0]), "reward: must return finite numbers"),
+        ("reward", np.array([0.0, 1e300, 0.0]), "reward: must return finite numbers"),
+        ("reward", np.array(["much", "little", "none"]), "reward: must return numbers, not <U6"),
+        ("outcome", np.full(3, 42), "outcome: must return Outcome numbers, 0 to 8, not 42"),
+        ("outcome", np.full(3, -1), "outcome: must return Outcome numbers, 0 to 8, not -1"),
+        ("outcome", np.full(3, 0.5), r"outcome: must return Outcome numbers, 0 to 8, not 0\.5"),
+        ("outcome", np.full(3, np.nan), "outcome: must return Outcome numbers, 0 to 8, not nan"),
+        ("outcome", np.array(["fell"] * 3), "outcome: must return numbers, not <U4"),
+        ("observe", np.full((3, 1), np.nan), "observe: must return finite numbers"),
+        ("observe", np.zeros(3), r"observe: must return an array of shape \(3, 1\), not \(3,\)"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:overflow encountered in cast:RuntimeWarning")
+def test_values_that_nothing_can_be_learnt_from_are_refused(method, returned, says):
+    added = {"added": GentleBall.added} if method == "observe" else {}
+    task = type("Wrong", (RollerBall,), {method: lambda _self, _given: returned, **added})(TaskSettings(), 3)
+    with pytest.raises(TaskError, match=says):
+        task.reset(1)
+        task.step()
