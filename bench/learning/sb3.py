@@ -31,7 +31,7 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc]  # its package has no types
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(is_over):
             infos[i] = {
-                "terminal_observation": _row(info["final_obs"], int(i)),
+                "terminal_observation": info["final_obs"][i],
                 "TimeLimit.truncated": bool(is_truncated[i]),
                 "is_success": bool(info["outcome"][i] == 1),
             }
@@ -51,10 +51,3 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc]  # its package has no types
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:  # noqa: ARG002
         return [False] * self.num_envs
-
-
-def _row(observations: Any, i: int) -> Any:
-    """The observation of one environment: an array, or a dictionary of them."""
-    if isinstance(observations, dict):
-        return {name: part[i] for name, part in observations.items()}
-    return observations[i]
