@@ -43,7 +43,7 @@ train-demo: $(STAMP) ## Train Parking1 from nothing while you watch, then look a
 	@$(BIN)/honeyguide eval results/train-demo/Parking1.pt --env-args split=test
 	@$(BIN)/honeyguide play results/train-demo/Parking1.pt --env-args split=test --envs 4 --episodes 3 --mp4 results/train-demo/Parking1.mp4
 
-reproduce-cars: $(STAMP) ## Train every row of docs/results/cars.md from scratch (hours); flags: ARGS="parking1 --seeds 2"
+reproduce-cars: $(STAMP) ## Train every row of docs/results/cars.md from scratch (hours); one row anew: ARGS="--shipped --again parking1"
 	@$(BIN)/python -m bench.cars $(ARGS)
 
 reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow.md (hours); flags: ARGS="student"
@@ -57,6 +57,7 @@ reproduce-navigate-rover: $(STAMP) ## Train NavigateRover's two policies from no
 	@$(BIN)/python -m bench.training_seeds navigate-rover-follow $(ARGS)
 	@$(BIN)/python -m bench.training_seeds navigate-rover $(ARGS)
 	@$(BIN)/python -m bench.navigate_rover results/navigate-rover-chosen.pt
+	@$(BIN)/python -m bench.follow_rover results/navigate-rover-follow-chosen.pt
 
 reproduce-offline: $(STAMP) ## Log flights, learn from their logs alone, forecast, then fly: to follow, park and navigate; one: ARGS="--story park"
 	@$(BIN)/python -m bench.offline_story $(ARGS)

@@ -16,10 +16,12 @@ def with_figures(text: str, rows: list[dict[str, Any]]) -> str:
     """The page's text with the given rows between its markers."""
     head, rest = text.split(BEGIN)
     tail = rest.split(END)[1]
-    lines = [f"On {row}:\n\n" for row in dict.fromkeys(row["machine"] for row in rows)]
-    lines.append("| figure | measured | target |\n|---|---|---|\n")
-    lines += [_line(row) for row in rows if not row["name"].endswith(DETAILS)]
-    return head + BEGIN + "".join(lines) + END + tail
+    shown = [row for row in rows if not row["name"].endswith(DETAILS)]
+    lines = []
+    for machine in dict.fromkeys(row["machine"] for row in shown):
+        lines.append(f"On {machine}:\n\n| figure | measured | target |\n|---|---|---|\n")
+        lines += [_line(row) for row in shown if row["machine"] == machine] + ["\n"]
+    return head + BEGIN + "".join(lines[:-1]) + END + tail
 
 
 def _line(row: dict[str, Any]) -> str:

@@ -82,6 +82,8 @@ def main(arguments: list[str]) -> int:
         forest = Forest(trees_per_ha, 0.0, 0.0, 1.0)
         crossings = [cross(pilot, forest, FIRST_SEED + 2 * (i + k * FLIGHTS), UNGUARDED) for i in range(count)]
         lines.append(told(trees_per_ha, crossings))
+    if arguments:  # the page is of the policy that ships
+        return 0
     section = SECTION.format(flights=count, rows="\n".join(lines), machine=machine())
     write_whole(PAGE, with_section(PAGE.read_text(), FLOWN, section).encode())
     return 0

@@ -1,8 +1,9 @@
 """`python -m bench.cars [NAME…]`: trains every row of docs/results/cars.md from scratch and writes the page.
 
 Runs that are done (results/cars/NAME-SEED.json) are kept; `--again` trains them anew, `--page` only writes the page,
-`--shipped` takes the runs that the shipped page was made of (docs/results/cars.jsonl) as done. Two runs go side by
-side, each on a core of its own.
+`--shipped` takes the runs that the shipped page was made of (docs/results/cars.jsonl) as done: without it the page is
+of what has been run here alone. Policies stay in results/cars/; `--publish` puts the best seeds' in the place of those
+that ship. Two runs go side by side, each on a core of its own.
 """
 
 from collections.abc import Sequence
@@ -33,6 +34,9 @@ def main(
     again: Annotated[bool, typer.Option("--again", help="Train anew what is there.")] = False,
     page: Annotated[bool, typer.Option("--page", help="Train nothing, only write the page.")] = False,
     shipped: Annotated[bool, typer.Option("--shipped", help="Take the shipped page's runs as done.")] = False,
+    publish: Annotated[
+        bool, typer.Option("--publish", help="Put the best seeds' policies in the place of those that ship.")
+    ] = False,
 ) -> None:
     unknown = [name for name in names or () if name not in EXPERIMENTS]
     if unknown:
@@ -50,7 +54,8 @@ def main(
     path = write_page(there)
     write_all(RUNS, [result for runs in there.values() for result in runs])
     console.print(f"wrote {path}")
-    _publish(there)
+    if publish:
+        _publish(there)
     for name in failed:
         console.print(f"[red]failed[/red] {name}: see {RESULTS / name}.log")
     raise typer.Exit(1 if failed else 0)
@@ -68,8 +73,9 @@ def results() -> dict[str, list[Result]]:
 def _publish(there: dict[str, list[Result]]) -> None:
     """Puts the best policies of the headline into policies/pretrained/, their cards with how they were judged."""
     for experiment in SECTIONS[0].experiments:
-        if (best := shipped(experiment, there.get(experiment.name, ()))) is None:
-            continue
+        runs = there.get(experiment.name, ())
+        if len(runs) < experiment.seeds or (best := shipped(experiment, runs)) is None:
+            continue  # the best of fewer seeds than the page's is none
         seed, judged = best
         if (trained := RESULTS / f"{experiment.name}-{seed}.pt").exists():
             found = rate_of(judged.successes, judged.episodes)

@@ -25,6 +25,9 @@ this page is made by one command, from nothing, which takes hours on two cores a
 make reproduce-cars
 ```
 
+What comes of it stays in `results/cars/`, and the policies that ship are kept: with `ARGS="--publish"` the best of the
+seeds take their place.
+
 Each run is one process on one core, with another run on the other core beside it. Time is that of training, from the
 first decision to the last update; compiling the kernels, once per machine, is not in it. It is wall clock, or, where it
 says "CPU", time of the processor, of runs that had other work beside them. Success is that of the most probable

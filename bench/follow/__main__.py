@@ -34,7 +34,7 @@ RESULTS = Path("results/follow")
 RUNS = DOCS / "follow.jsonl"
 PRETRAINED = Path(__file__).parents[2] / "policies" / "pretrained"
 console = Console(highlight=False)
-Choose = Callable[[Sequence[Path], str], tuple[Path, Interval]]
+Choose = Callable[[Sequence[Path], Stage], tuple[Path, Interval]]
 
 
 def main(
@@ -54,10 +54,7 @@ def main(
         raise typer.Exit(2)
     if shipped:
         for result in read_all(RUNS):
-            path = result_path(RESULTS, result.stage, result.seed)
-            if not path.exists():
-                write(path, result)
-                _fetch(result)
+            _take(result, RESULTS)
     failed: list[str] = []
     if not page:
         if again:
@@ -83,11 +80,17 @@ def results() -> dict[str, list[Result]]:
     return found
 
 
-def _fetch(result: Result) -> None:
-    """Puts the policy that ships where the stages after it look for it."""
-    shipped = PRETRAINED / f"{STAGES[result.stage].recipe}.pt"
-    if result.seed == 1 and shipped.exists():
-        write_whole(policy_path(RESULTS, result.stage, 1), shipped.read_bytes())
+def _take(result: Result, folder: Path) -> None:
+    """Takes a result as done, with its policy where that ships; not without, where something still needs the policy."""
+    path, stage = result_path(folder, result.stage, result.seed), STAGES[result.stage]
+    shipped = PRETRAINED / f"{stage.recipe}.pt"
+    is_there = result.seed == 1 and shipped.exists()
+    is_needed = any(stage.name in other.before for other in STAGES.values())
+    if path.exists() or (not is_there and (is_needed or (stage.flies and not result.cards(is_flown=True)))):
+        return
+    write(path, result)
+    if is_there:
+        write_whole(policy_path(folder, result.stage, 1), shipped.read_bytes())
 
 
 def published(results_folder: Path, pretrained: Path, choose: Choose = best_of) -> list[str]:
@@ -96,7 +99,7 @@ def published(results_folder: Path, pretrained: Path, choose: Choose = best_of) 
     Args:
         results_folder: where they were trained.
         pretrained: where those that ship are.
-        choose: the best of several seeds' by a figure of the scorecard.
+        choose: the best of several seeds' of a stage.
     """
     lines = []
     for stage, trained in _trained(results_folder):
@@ -106,7 +109,7 @@ def published(results_folder: Path, pretrained: Path, choose: Choose = best_of) 
             best = trained[0]
             write_whole(ships, best.read_bytes())
         else:
-            best, found = choose(trained, stage.figure)
+            best, found = choose(trained, stage)
             write_judged(best, ships, MEASURES[stage.figure], found, EPISODES)
         if ships.read_bytes() != before:
             lines.append(f"{ships.name}: ships now what lies in {best}")
@@ -150,7 +153,8 @@ def _jobs(names: Sequence[str], seeds: int) -> list[Job]:
                 there = partial(_are_done, stage.before, seed)
                 jobs.append(Job(name, ("bench.follow.run", *words), takes_all=stage.takes_all, is_ready=there))
             if stage.flies and not (path.exists() and read(path).cards(is_flown=True)):
-                jobs.append(Job(f"{name}-flown", ("bench.follow.flights", *words), is_ready=path.exists))
+                is_trained = partial(_are_done, (stage.name,), seed)
+                jobs.append(Job(f"{name}-flown", ("bench.follow.flights", *words), is_ready=is_trained))
     return jobs
 
 

@@ -16,6 +16,7 @@ from rich.progress import track
 from rich.table import Table
 
 from bench.follow.judge import first_episodes
+from bench.follow.stages import Stage
 from bench.judged_card import write_judged
 from common.intervals import Interval
 from policies.learn.export.policy_file import load_policy
@@ -65,9 +66,10 @@ def best_first(found: Mapping[Path, Interval]) -> list[Path]:
     return sorted(found, key=lambda path: -found[path].low)
 
 
-def best_of(paths: Sequence[Path], figure: str) -> tuple[Path, Interval]:
-    """The policy whose interval of a figure of the scorecard begins highest, and that interval."""
-    found = {path: getattr(judged(path, WIDE, EPISODES, {}), figure) for path in paths}
+def best_of(paths: Sequence[Path], stage: Stage) -> tuple[Path, Interval]:
+    """The policy of a stage whose interval of its figure begins highest, and that interval."""
+    numbers = load_policy(paths[0])[1].samplers() if stage.is_chosen_as_drawn else {}
+    found = {path: getattr(judged(path, WIDE, EPISODES, numbers), stage.figure) for path in paths}
     best = best_first(found)[0]
     return best, found[best]
 

@@ -34,6 +34,7 @@ class Stage:
     takes_all: bool = False  # its training is given all cores
     flies: bool = False  # also judged in flights over MAVLink
     ships: bool = True  # with --publish the best seed's policy goes to policies/pretrained/
+    is_chosen_as_drawn: bool = False  # the best seed is chosen in the conditions of training, not in the preset's
     document: str = "not reported"
     limit_s: float | None = None  # wall clock at most, with all stages before it
     figure: str = "in_band"  # of the scorecard, that the targets are of
@@ -75,6 +76,7 @@ STAGES: dict[str, Stage] = {
             teacher="teacher",
             start="student",
             flies=True,
+            is_chosen_as_drawn=True,
             limit_s=3600.0,
         ),
         Stage(

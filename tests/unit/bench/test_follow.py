@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.cars.page import DOCS
 from bench.cars.result import Point
-from bench.follow.__main__ import published, unpublished
+from bench.follow.__main__ import RUNS, _jobs, _take, published, unpublished
 from bench.follow.choice import best_first
 from bench.follow.page import duration, write_page
 from bench.follow.result import Judged, Result, read, read_all, write, write_all
+from bench.follow.run import policy_path, result_path
 from bench.follow.stages import CELLS, OWNER_SPEEDS, STAGES, in_order
 from common.intervals import Interval
 from policies.learn.config.recipes import recipe
@@ -106,8 +108,8 @@ def test_of_several_seeds_the_chosen_is_published_whichever_shipped_and_says_wha
     (ships / "follow-me-late.pt").write_bytes(shipped("follow-me-late"))
     asked = []
 
-    def second(paths, figure):
-        asked.append(([path.name for path in paths], figure))
+    def second(paths, stage):
+        asked.append(([path.name for path in paths], stage.figure))
         return paths[1], Interval(0.8, 0.7, 0.9)
 
     assert len(published(tmp_path, ships, second)) == 1
@@ -126,3 +128,23 @@ def test_the_best_is_whose_interval_begins_highest_and_of_equals_the_first():
     found = {Path(name): Interval(value, low, 1.0) for name, value, low in (("a", 0.9, 0.7), ("b", 0.8, 0.8))}
     found |= {Path("c"): Interval(0.95, 0.8, 1.0)}
     assert best_first(found) == [Path("b"), Path("c"), Path("a")]
+
+
+def test_what_the_shipped_page_was_made_of_leaves_every_other_stage_able_to_begin(tmp_path, monkeypatch):
+    """With its results taken as done, a stage whose policy does not ship any more is trained where others need it."""
+    monkeypatch.setattr("bench.follow.__main__.RESULTS", tmp_path)
+    for each in read_all(RUNS):
+        _take(each, tmp_path)
+    left = _jobs(list(STAGES), 1)
+    assert "teacher-1" not in {job.name for job in left}
+    assert "student-1" in {job.name for job in left}
+    for job in left:  # in order, each leaves its result and its policy
+        assert job.is_ready(), job.name
+        stage = job.name.removesuffix("-1").removesuffix("-1-flown")
+        write(result_path(tmp_path, stage, 1), result(stage))
+        policy_path(tmp_path, stage, 1).write_bytes(b"")
+
+
+def test_the_page_is_what_its_results_give(tmp_path):
+    results = {name: [each for each in read_all(RUNS) if each.stage == name] for name in STAGES}
+    assert write_page(results, tmp_path).read_text() == (DOCS / "follow.md").read_text()
