@@ -22,7 +22,7 @@ from policies.tasks.follow_me.track import Ranges
 from policies.tasks.follow_me.tracked.keep_off import SLOW_S
 
 PLOT = Path(__file__).parents[1] / "results" / "images" / "failures.png"
-FLIGHTS = (("silent", 3900671), ("crossed", 3900713), ("run", 3900665))
+FLIGHTS = (("late-setpoints", 3938049), ("phone", 3938009), ("lost", 3938057))
 SHOWN_S = 16.0  # about the moment
 MARKS_S = 4.0
 BAND = Ranges()
