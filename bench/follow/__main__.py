@@ -52,15 +52,15 @@ def main(
     if unknown:
         console.print(f"follow: no stage {unknown[0]}; there are {', '.join(STAGES)}", markup=False)
         raise typer.Exit(2)
-    if shipped:
-        for result in read_all(RUNS):
-            _take(result, RESULTS)
+    recorded = read_all(RUNS) if shipped else []
+    for result in recorded:
+        _take(result, RESULTS)
     failed: list[str] = []
     if not page:
         if again:
             _forget(names or list(STAGES), seeds)
         failed = run_side_by_side(_jobs(names or list(STAGES), seeds), RESULTS, jobs, console)
-    there = results()
+    there = results(recorded)
     path = write_page(there)
     write_all(RUNS, [result for runs in there.values() for result in runs])
     console.print(f"wrote {path}")
@@ -71,12 +71,14 @@ def main(
     raise typer.Exit(1 if failed else 0)
 
 
-def results() -> dict[str, list[Result]]:
-    """Every result there is, by stage and in order of seed."""
+def results(recorded: Sequence[Result] = ()) -> dict[str, list[Result]]:
+    """Every result there is here, else as it is recorded, by stage and in order of seed."""
     found: dict[str, list[Result]] = {}
     for name in STAGES:
         paths = [path for path in RESULTS.glob(f"{name}-*.json") if path.stem.rsplit("-", 1)[0] == name]
-        found[name] = sorted((read(path) for path in paths), key=lambda result: result.seed)
+        by_seed = {result.seed: result for result in recorded if result.stage == name}
+        by_seed |= {result.seed: result for result in map(read, paths)}
+        found[name] = [by_seed[seed] for seed in sorted(by_seed)]
     return found
 
 

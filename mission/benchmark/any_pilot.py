@@ -53,6 +53,8 @@ class CheckedPilot:
         self.reset()
 
     def __getattr__(self, part: str) -> Any:
+        if part.startswith("_"):
+            raise AttributeError(part)
         return getattr(self._made, part)
 
     def reset(self) -> None:
@@ -68,7 +70,7 @@ class CheckedPilot:
         given = self._ask("act", *seen)
         try:
             action: Floats = np.asarray(given, dtype=np.float32)
-        except (TypeError, ValueError):
+        except Exception:  # a tensor that is learnt, a string: no numbers
             action = np.zeros(0, np.float32)
         if action.shape != (self._action_size,):
             gave = f"{action.size} in shape {action.shape}" if action.ndim and action.size else repr(given)[:40]

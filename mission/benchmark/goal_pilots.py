@@ -46,6 +46,8 @@ def goal_pilot(name: str, kind: type[P], stack: int) -> P:
         if not hasattr(made, part):
             setattr(made, part, given)
     task = kind.task
+    if not isinstance(made.stack, int) or made.stack < 1:
+        raise PilotError(f"{name}: stack {made.stack!r}: must be how many frames it takes")
     found: Any = CheckedPilot(made, name, len(task.continuous), np.zeros(made.stack * task.frame_size, np.float32))
     checked: P = found
     return checked

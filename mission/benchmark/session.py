@@ -65,9 +65,9 @@ def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
         for name in names
         for seed in range(options.seed, options.seed + 2 * options.flights, 2)
     ]
-    _make_folders(flights)
     if options.out is not None:
         _make(options.out, "--out")
+    _make_folders(flights)
     if options.seed % 2 == 0 and options.record is None:
         print_line(console, f"seed {options.seed}: even seeds are of worlds that trainings draw from")
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())

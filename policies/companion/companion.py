@@ -90,7 +90,7 @@ class Companion:
         begun_s = self._wall_s() if self._wall_s is not None else None  # a guard looks at the image as it comes in
         has_sensed = skill.receive(vehicle, time_us)
         if skill.is_ordered():
-            self.engagement.engage()
+            self.engagement.engage(is_flown=vehicle.is_flown)
             self._is_sent_in_guided = vehicle.own.mode is Mode.GUIDED
         blindness = self._blindness(time_us)
         loss = skill.loss(vehicle.own)

@@ -105,9 +105,13 @@ class Engagement:
         self._asked_us = 0  # when a mode was last asked for
         self._was_offboard = True  # until seen otherwise: a vehicle found in Offboard is flown by somebody else
 
-    def engage(self) -> None:
-        """Tells the companion to take control as soon as everything is there; also if it has just let go."""
-        self._is_reported = self.phase is not Phase.FLYING  # who flies has nothing to take
+    def engage(self, *, is_flown: bool = True) -> None:
+        """Tells the companion to take control as soon as everything is there; also if it has just let go.
+
+        Args:
+            is_flown: the vehicle is in a mode that it can be flown in; it may have left it since the last step.
+        """
+        self._is_reported = self.phase is not Phase.FLYING or not is_flown  # who flies has nothing to take
         if self.phase is Phase.RELEASED:
             self.phase = Phase.WAITING
 
@@ -208,7 +212,7 @@ class Engagement:
     def _flying(self, now: Situation) -> Orders:
         if not now.is_offboard:
             self._aftermath.let_go(now.time_us, now.condition)
-            return self._stop(now)
+            return self._go(Phase.RELEASED, now, text=_stopped(now))
         if not now.is_airborne:
             return self._go(Phase.RELEASED, now, text="Companion: stopped: not in the air")
         if now.trouble:
@@ -281,7 +285,7 @@ class Engagement:
     def _stop(self, now: Situation) -> Orders:
         """Somebody else has control; nothing that was asked for before counts any more."""
         self._is_reported = False
-        return self._go(Phase.RELEASED, now, text=f"Companion: stopped: mode {now.mode_name}")
+        return self._go(Phase.RELEASED, now, text=_stopped(now))
 
     def _fly(self, now: Situation) -> Orders:
         self._is_reported = False
@@ -300,6 +304,10 @@ class Engagement:
 def _is_just_heard(now: Situation) -> bool:
     """Whether a heartbeat has come in for this step: the mode is the vehicle's, not one of up to seconds ago."""
     return now.condition.heartbeat_age_us == 0
+
+
+def _stopped(now: Situation) -> str:
+    return f"Companion: stopped: mode {now.mode_name}"
 
 
 def _offered(now: Situation) -> Sending:

@@ -71,6 +71,7 @@ class Goals:
         self._items: tuple[MissionItem, ...] = ()  # of the plan as it was last looked at
         self._seq = -1  # that was current then
         self._known = 0  # how much of what tells where its places are
+        self._has_reached = False  # something, since the plan was another
         self._waypoints: list[Goal] = []  # that are left
         self.done = ""  # what has been reached, once nothing is left
         self._vehicle = vehicle
@@ -83,13 +84,17 @@ class Goals:
     def frame(self, time_us: int) -> None:
         """Keeps the plan; before `goal`."""
         self._plan.frame(time_us)
-        known = self._known_count()
-        if (self._plan.items, self._plan.current_seq) != (self._items, self._seq) or known > self._known:
-            self._items, self._seq = self._plan.items, self._plan.current_seq
-            self._known = max(known, self._known)
-            self._waypoints = self._waypoints_of(self._items, self._seq)
-            if self._waypoints:
-                self.done = ""
+        known, is_new = self._known_count(), (self._plan.items, self._plan.current_seq) != (self._items, self._seq)
+        if is_new:
+            self._items, self._seq, self._has_reached = self._plan.items, self._plan.current_seq, False
+        elif known <= self._known:
+            return
+        self._known = max(known, self._known)
+        left = len(self._waypoints) if self._has_reached else len(self._items)  # of a plan that is under way, or over
+        waypoints = self._waypoints_of(self._items, self._seq)
+        self._waypoints = waypoints[max(len(waypoints) - left, 0) :]
+        if self._waypoints:
+            self.done = ""
 
     def is_ordered(self) -> bool:
         """Whether a goto has asked to be flown since the last call."""
@@ -103,7 +108,7 @@ class Goals:
 
     def reached(self) -> Goal | None:
         """Takes note that the goal has been reached, and returns what was."""
-        reached = self.goal
+        reached, self._has_reached = self.goal, True
         if self._goto is not None:
             self._goto = None
             self._waypoints = []  # the plan was not asked for

@@ -14,6 +14,7 @@ from common.image_stream import ImageFrame, ImageReader, ImageStreamError
 
 RETRY_US = 500_000
 SILENT_US = 2_000_000  # a camera that lost its power says no goodbye; guess: twenty images
+FIRST_US = 20_000_000  # some begin with a connection what takes seconds; guess
 _CHUNK = 1 << 18  # [byte] of one read: sixteen images of 64 x 64 x 4
 READS_MAX = 4  # of one step: a camera that floods must not hold up the pilot
 _UNDER_WAY = {0, errno.EAGAIN, errno.EALREADY, errno.EINPROGRESS, errno.EISCONN, errno.ENOTCONN}
@@ -75,6 +76,7 @@ class StreamCamera:
         self._reader = ImageReader()
         self._retry_us = 0
         self._heard_us = 0  # when something came in last, or the connection was begun
+        self._has_heard = False  # on this connection
         self.trouble = ""  # why there are no images, as far as is known
 
     def take(self, time_us: int) -> ImageFrame | None:
@@ -88,19 +90,20 @@ class StreamCamera:
             data = self._read()
             if not data:
                 break
-            self._heard_us = time_us
+            self._heard_us, self._has_heard = time_us, True
             try:
                 frames = self._reader.feed(data)
             except ImageStreamError as error:
                 self._give_up(str(error))
                 break
             newest = frames[-1] if frames else newest
-        if self._socket is not None and time_us - self._heard_us > SILENT_US:
+        patience_us = SILENT_US if self._has_heard else FIRST_US
+        if self._socket is not None and time_us - self._heard_us > patience_us:
             self._give_up("the camera is silent")
         return newest
 
     def _connect(self, time_us: int) -> None:
-        self._reader, self._heard_us = ImageReader(), time_us
+        self._reader, self._heard_us, self._has_heard = ImageReader(), time_us, False
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         self._socket.setblocking(False)
         try:

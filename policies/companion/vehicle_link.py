@@ -26,7 +26,7 @@ from common.attitude import Quat, Vector, rotated
 from common.geodesy import GeoPoint, ned_from_geodetic
 from policies.companion.engagement import Wish
 from policies.companion.odometry.steady_frame import SteadyFrame
-from policies.companion.vehicle_clock import REORDERED_MS, VehicleClock
+from policies.companion.vehicle_clock import VehicleClock
 
 Floats = NDArray[np.float64]
 Listener = Callable[[int, int, Any, int], None]
@@ -34,6 +34,7 @@ Listener = Callable[[int, int, Any, int], None]
 
 COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 RANGE_OLD_US = 500_000  # a range measured longer ago tells nothing of the ground below
+OVERTAKEN_US = 1_000_000  # an attitude older by no more has been overtaken; by more, the vehicle has restarted; guess
 REQUEST_US = 5_000_000  # rates are asked for again: the vehicle may have restarted
 TEXT_LENGTH = 50  # characters of one STATUSTEXT
 NEVER_US = -(1 << 62)
@@ -336,7 +337,7 @@ class VehicleLink:
         omega_frd = (fields.rollspeed, fields.pitchspeed, fields.yawspeed)
         if is_known(1.1, *wxyz) and is_known(RATE_MAX_RAD_S, *omega_frd):  # of unit length, but for rounding
             own, boot_us = self.own, self.clock.time_us(fields.time_boot_ms)
-            if 0 < own.boot_us - boot_us <= REORDERED_MS * 1000:
+            if 0 < own.boot_us - boot_us <= OVERTAKEN_US:
                 return  # overtaken by a newer one
             own.q_ned_from_frd, own.omega_frd = quat_from_wxyz(wxyz), omega_frd
             own.boot_us, own.attitude_us = boot_us, time_us

@@ -8,6 +8,7 @@ a training would stop them in the midst of a step.
 import contextlib
 import os
 import signal
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
@@ -110,12 +111,15 @@ def make_envs(
 
 
 def close_envs(envs: VectorEnv[Any, Any, Any]) -> None:
-    """Closes environments, and ends processes of theirs."""
-    if not isinstance(envs, AsyncVectorEnv):
-        envs.close()
-        return
-    with contextlib.suppress(EOFError, OSError):  # of a process that has ended already
-        envs.close(timeout=_CLOSE_S)
+    """Closes environments, and ends processes of theirs; one that cannot be closed costs nobody what was learnt."""
+    try:
+        if isinstance(envs, AsyncVectorEnv):
+            with contextlib.suppress(EOFError, OSError):  # of a process that has ended already
+                envs.close(timeout=_CLOSE_S)
+        else:
+            envs.close()
+    except Exception as error:  # whatever anybody's close raises
+        warnings.warn(f"environments were not closed: {type(error).__name__}: {_one_line(error)}", stacklevel=2)
 
 
 def renders(envs: VectorEnv[Any, Any, Any]) -> bool:

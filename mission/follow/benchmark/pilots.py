@@ -43,7 +43,7 @@ def any_pilot(name: str) -> Pilot:
     if ":" not in name:
         return load_pilot(name)
     made = made_by_name(name, ("kind", "image_shape", "reset", "act"))
-    if made.kind not in _ELEMENTS:
+    if made.kind not in list(_ELEMENTS):
         raise PilotError(f"{name}: kind {made.kind}: must be one of {', '.join(map(str, _ELEMENTS))}")
     if made.image_shape != IMAGE_SHAPE:
         raise PilotError(f"{name}: image_shape {made.image_shape}: must be {IMAGE_SHAPE}")

@@ -8,7 +8,7 @@ import pytest
 
 from bench.cars.page import DOCS
 from bench.cars.result import Point
-from bench.follow.__main__ import RUNS, _jobs, _take, published, unpublished
+from bench.follow.__main__ import RUNS, _jobs, _take, published, results, unpublished
 from bench.follow.choice import best_first
 from bench.follow.page import duration, write_page
 from bench.follow.result import Judged, Result, read, read_all, write, write_all
@@ -136,6 +136,7 @@ def test_what_the_shipped_page_was_made_of_leaves_every_other_stage_able_to_begi
     for each in read_all(RUNS):
         _take(each, tmp_path)
     left = _jobs(list(STAGES), 1)
+    assert {name for name, found in results(read_all(RUNS)).items() if found} == {each.stage for each in read_all(RUNS)}
     assert "teacher-1" not in {job.name for job in left}
     assert "student-1" in {job.name for job in left}
     for job in left:  # in order, each leaves its result and its policy

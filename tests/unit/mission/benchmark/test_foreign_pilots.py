@@ -6,15 +6,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import torch
 from typer.testing import CliRunner
 
 from mission.benchmark import session
 from mission.benchmark.any_pilot import CheckedPilot
+from mission.benchmark.goal_pilots import goal_pilot
 from mission.benchmark.session import BenchmarkOptions, benchmark_session
 from mission.cli import app
 from mission.follow.benchmark.flights import Outcome
 from mission.follow.benchmark.pilots import any_pilot
 from policies.companion.pilot import PilotError
+from policies.companion.vector_pilot import NavigationPilot
 from policies.tasks.follow_me.observe import EGO
 
 FLOWN = Outcome(3, 0.99, False, False, 1.5, float("nan"), None, None, True, 10.0, 0.5, 5.0, 60.0, "")
@@ -55,6 +58,15 @@ class GivesThree(Stands):
         return np.zeros(3)
 
 
+class GivesWhatIsLearnt(Stands):
+    def act(self, vector, image):  # noqa: ARG002
+        return torch.zeros(4, requires_grad=True)
+
+
+class IsOfManyKinds(Stands):
+    kind = [0]  # noqa: RUF012
+
+
 class GivesNothing(Stands):
     def act(self, vector, image):
         pass
@@ -69,6 +81,8 @@ class GivesNothing(Stands):
         ("Raises", "act: RuntimeError: out of ideas"),
         ("GivesThree", "act gives 4 numbers, not 3 in shape (3,)"),
         ("GivesNothing", "act gives 4 numbers, not None"),
+        ("GivesWhatIsLearnt", "act gives 4 numbers, not tensor("),
+        ("IsOfManyKinds", "kind [0]: must be one of 0, 1, 3"),
     ],
 )
 def test_a_class_that_cannot_fly_is_refused_in_a_sentence(name, sentence):
@@ -91,14 +105,23 @@ def test_a_mistake_in_flight_names_what_made_it():
         pilot.act(np.zeros(3), np.zeros(1))
 
 
+@pytest.mark.parametrize("stack", [None, "3", 0])
+def test_a_stack_that_is_no_count_is_refused(monkeypatch, stack):
+    monkeypatch.setattr(Stands, "stack", stack, raising=False)
+    with pytest.raises(PilotError, match="must be how many frames it takes"):
+        goal_pilot(f"{__name__}:Stands", NavigationPilot, 2)
+
+
 @pytest.mark.parametrize("inside", ["", "more"])
 def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_flown(tmp_path, inside):
     (tmp_path / "file").write_text("something")
-    words = ["--policy", "scripted", "--condition", "walk", "--out", str(tmp_path / "file" / inside)]
+    words = ["--policy", "scripted", "--condition", "walk", "--record", str(tmp_path / "record")]
+    words += ["--out", str(tmp_path / "file" / inside)]
     result = CliRunner().invoke(app, ["benchmark", "follow", *words])
     assert result.exit_code == 2
     assert "cannot be made" in result.stderr
     assert (tmp_path / "file").read_text() == "something"
+    assert not (tmp_path / "record").exists()  # so that the same words, mended, are taken
 
 
 class Here:

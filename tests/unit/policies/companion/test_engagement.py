@@ -227,3 +227,10 @@ def test_a_goto_while_it_hands_back_counts_unless_a_pilot_takes_over(is_hold, wi
     bench.machine.engage()
     bench.step(holding=is_hold)
     assert {bench.step().wish for _ in range(500)} == wishes
+
+
+def test_a_goto_that_comes_with_the_end_of_the_flight_counts():
+    bench = Bench().flying()
+    bench.machine.engage(is_flown=False)  # the mode has changed since the last step, which that has not seen yet
+    assert "stopped" in bench.step().text
+    assert {bench.step().wish for _ in range(500)} == {Wish.NONE, Wish.OFFBOARD}

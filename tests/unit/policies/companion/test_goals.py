@@ -237,7 +237,29 @@ def test_a_plan_that_is_there_before_position_and_home_are_has_its_places_once_t
         late.step(20_000)
     assert late.goals.goal == at_once.goals.goal
     assert isfinite(late.goals.goal.pos_ned[2])
-    late.goals.reached()
-    late.get_home()
-    late.step(20_000)
-    assert late.goals.goal.name.startswith("waypoint 2")
+
+
+@pytest.mark.parametrize(("reached", "left"), [(1, "waypoint 2 of 2"), (2, None)])
+def test_a_home_that_is_learnt_under_way_gives_the_places_that_are_left_their_heights(reached, left):
+    vehicle = Vehicle(is_placed=False)
+    vehicle.get_place()
+    plan(vehicle, TOUR)
+    for _ in range(reached):
+        vehicle.goals.reached()
+    done = vehicle.goals.done
+    vehicle.get_home()
+    vehicle.step(20_000)
+    assert (vehicle.goals.goal and vehicle.goals.goal.name) == left
+    assert vehicle.goals.goal is None or isfinite(vehicle.goals.goal.pos_ned[2])
+    assert vehicle.goals.done == done
+
+
+def test_a_home_that_is_learnt_after_a_goto_brings_back_no_plan_that_was_not_asked_for():
+    vehicle = Vehicle(is_placed=False)
+    vehicle.get_place()
+    plan(vehicle, TOUR)
+    vehicle.goto(20.0, 0.0)
+    vehicle.goals.reached()
+    vehicle.get_home()
+    vehicle.step(20_000)
+    assert (vehicle.goals.goal, vehicle.goals.done) == (None, "goto reached")

@@ -396,6 +396,16 @@ def test_closing_it_closes_each_environment():
     assert closed == [True, True]
 
 
+def test_an_environment_that_cannot_be_closed_is_told_of_and_costs_nothing():
+    def refuse():
+        raise RuntimeError("window gone")
+
+    task = build_task("gym:Corridor-v0", 1)
+    task.envs.envs[0].unwrapped.close = refuse
+    with pytest.warns(UserWarning, match="not closed: RuntimeError: window gone"):
+        task.close()
+
+
 @pytest.mark.parametrize("how", ["sync", "async"])
 def test_an_environment_that_renders_nothing_says_so(how):
     task = build_task("gym:Faulty-v0", 2, settings_of("gym:Faulty-v0", [f"vectorization={how}"]))
