@@ -18,7 +18,7 @@ _GAIL = {"strength": 0.01, "demo_path": "recorded", "reward_form": "logit", "bat
 def _sparse(name: str, title: str, document: str, signals: dict[str, Any]) -> Experiment:
     """Parking 1 paid at the end only, with another signal beside."""
     changes = _SPARSE | {f"behavior.reward_signals.{signal}": block for signal, block in signals.items()}
-    return Experiment(name, title, "parking1", 3, judged=(NEW_SPOTS,), document=document, changes=changes)
+    return Experiment(name, title, "parking1", judged=(NEW_SPOTS,), document=document, changes=changes)
 
 
 SPARSE = (
@@ -39,7 +39,7 @@ def _hill(name: str, title: str, task: str, document: str, signals: dict[str, An
     """Gymnasium's MountainCar with another signal beside the reward of the task."""
     changes = _HILL | {"env_settings.env_path": f"bench.cars.sparse_tasks:{task}"}
     changes |= {f"behavior.reward_signals.{signal}": block for signal, block in signals.items()}
-    return Experiment(name, title, "gym", 3, judged=(Judged("new starts"),), document=document, changes=changes)
+    return Experiment(name, title, "gym", judged=(Judged("new starts"),), document=document, changes=changes)
 
 
 _TOP = "MountainCarAtTop"
@@ -61,7 +61,9 @@ def _observation(name: str, title: str, document: str, settings: dict[str, Any],
     """Parking 1 as the document's car sees it: unit vectors, no range, no speed."""
     settings = {"observation": "as-documented", **settings}
     changes = {"behavior.max_steps": 3_000_000, "behavior.success_target": None, **changes}
-    return Experiment(name, title, "parking1", 3, settings, changes, (NEW_SPOTS,), document)
+    return Experiment(
+        name, title, "parking1", settings=settings, changes=changes, judged=(NEW_SPOTS,), document=document
+    )
 
 
 MEMORY = (
@@ -81,7 +83,6 @@ OTHERS = (
         "parking1-gamma",
         "ours with the document's gamma of 0.8",
         "parking1",
-        3,
         judged=(NEW_SPOTS,),
         document="its setting",
         changes={"behavior.reward_signals.extrinsic.gamma": 0.8, "environment_parameters.discount": 0.8},
@@ -90,19 +91,15 @@ OTHERS = (
         "parking2-stack",
         "Parking 2, last three stacked",
         "parking2",
-        3,
-        {"stack": 3},
+        settings={"stack": 3},
         judged=PARKING2_SPOTS,
         document="stacks three; 32.8 / 47.2 / 22.8 %",
     ),
-    Experiment(
-        "parking1-sac", "SAC", "parking1-sac", 3, judged=(NEW_SPOTS,), document="unstable, abandoned after 20 h"
-    ),
+    Experiment("parking1-sac", "SAC", "parking1-sac", judged=(NEW_SPOTS,), document="unstable, abandoned after 20 h"),
     Experiment(
         "roller-ball-hyper",
         "RollerBall, hyper-network on the target's place",
         "roller-ball",
-        3,
         document="(follow-me document: inert)",
         changes={
             "behavior.network_settings.goal_signal": True,
@@ -114,7 +111,6 @@ OTHERS = (
         "roller-ball-plain",
         "RollerBall, the same without",
         "roller-ball",
-        3,
         document="",
         changes={"behavior.max_steps": 300_000, "behavior.success_target": None},
     ),

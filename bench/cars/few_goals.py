@@ -29,11 +29,18 @@ def _few_goals(
     settings: dict[str, Any],
     changes: dict[str, Any] | None = None,
     recipe: str = "parking1",
-    seeds: int = 3,
 ) -> Experiment:
     """Parking 1 trained on the document's goals alone."""
     settings = {"goals": "published", **settings}
-    return Experiment(name, title, recipe, seeds, settings, _TWO_MILLION | (changes or {}), _FEW_GOALS, document)
+    return Experiment(
+        name,
+        title,
+        recipe,
+        settings=settings,
+        changes=_TWO_MILLION | (changes or {}),
+        judged=_FEW_GOALS,
+        document=document,
+    )
 
 
 def _gail_goals(name: str, title: str, document: str, changes: dict[str, Any]) -> Experiment:
@@ -42,8 +49,8 @@ def _gail_goals(name: str, title: str, document: str, changes: dict[str, Any]) -
 
 
 FEW_GOALS = (
-    _few_goals("parking1-goal", "one goal", "13 % (PPO)", {"goals": "one"}, seeds=5),
-    _few_goals("parking1-goals", "three goals", "", {}, seeds=5),
+    _few_goals("parking1-goal", "one goal", "13 % (PPO)", {"goals": "one"}),
+    _few_goals("parking1-goals", "three goals", "", {}),
     _gail_goals("parking1-goals-gail", "three goals, PPO + GAIL", "92 % (PPO + GAIL)", {}),
     _gail_goals(
         "parking1-goals-gail-strong",
@@ -73,11 +80,10 @@ QUARTERS = tuple(
         f"parking1-quarter-{quarter}",
         f"goals anywhere but in the quarter of {where}",
         "parking1",
-        3,
-        {"quarter": quarter},
-        _TWO_MILLION,
-        (Judged("that quarter", {"split": "test"}),),
-        "",
+        settings={"quarter": quarter},
+        changes=_TWO_MILLION,
+        judged=(Judged("that quarter", {"split": "test"}),),
+        document="",
     )
     for quarter, where in enumerate(("low x, low z", "high x, low z", "low x, high z", "high x, high z"), start=1)
 )
@@ -85,9 +91,8 @@ QUARTER_ANYWHERE = Experiment(
     "parking1-quarter-2-anywhere",
     "high x, low z held out; starts and blocks anywhere",
     "parking1",
-    3,
-    _ANYWHERE | {"quarter": 2},
-    _TWO_MILLION,
-    (Judged("that quarter, as published", _AS_PUBLISHED | {"split": "test"}),),
-    "",
+    settings=_ANYWHERE | {"quarter": 2},
+    changes=_TWO_MILLION,
+    judged=(Judged("that quarter, as published", _AS_PUBLISHED | {"split": "test"}),),
+    document="",
 )
