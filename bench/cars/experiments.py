@@ -175,7 +175,8 @@ Where chance does not find the goal, novelty does: the top of Gymnasium's Mounta
 that are the same but for the signal. PPO alone found it in one seed of five, late; given 150,000 steps that seed came
 to 97.7 %, and 100,000 were chosen after that. Where each step costs 1, as published, PPO needs no novelty to find it,
 probably because what it has tried is worse than it expected. Strength is 1 here, 0.01 in the rows of Parking 1, whose
-goal PPO finds by chance and which novelty only delays: curiosity in one seed of five beyond these three million steps.
+goal PPO finds by chance: novelty delays it there, and in one seed of five made it forget after two million steps, for
+good with curiosity, for a while with RND.
 
 Three stacked observations make no difference to Parking 2 that five seeds could show beside the row of the headline:
 the same recipe, both ended by its success target. They are ours, with distances and
