@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stable_baselines3 import PPO
 
 from bench.learning.sb3 import BatchVecEnv
-from policies.tasks.follow_me.observe import EGO, IMAGE_CHANNELS, IMAGE_SIZE
+from policies.tasks.follow_me.observe import EGO, IMAGE_SHAPE
 
 SAVED = Path("results/sb3-follow.zip")
 ENVS, ROLLOUT, BATCH, EPOCHS = 64, 128, 512, 2
@@ -24,7 +24,7 @@ class Sb3Follower:
     """What the benchmark asks for: a vector and an image in, four numbers in [-1, 1] out, ten times a second."""
 
     kind = int(EGO)  # of the vector: with what the phone says
-    image_shape = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))
+    image_shape = IMAGE_SHAPE
 
     def __init__(self) -> None:
         torch.set_num_threads(1)

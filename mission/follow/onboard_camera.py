@@ -17,7 +17,7 @@ from policies.tasks.follow_me.flown_cast import FlownCast
 from policies.tasks.follow_me.observe import (
     DEPTH_HALF_M,
     HFOV_DEG,
-    IMAGE_CHANNELS,
+    IMAGE_SHAPE,
     IMAGE_SIZE,
     TILT_DEG,
     camera_mount,
@@ -83,7 +83,7 @@ class _Renderer:
         rows = cast.rows
         size: dict[str, Any] = {"width": IMAGE_SIZE, "height": IMAGE_SIZE, "hfov_deg": HFOV_DEG}
         self._camera = QuickCamera(world, 1, **size, people=rows.drawn, clothes=rows.clothes, has_optics=True)
-        images: Any = wp.zeros((1, IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS)), dtype=wp.uint8)
+        images: Any = wp.zeros((1, *IMAGE_SHAPE), dtype=wp.uint8)
         params: Any = wp.clone(rows.params)
         params.numpy()["camera_noise"] *= noise
         everyone: Any = wp.full(1, value=True, dtype=wp.bool)

@@ -17,10 +17,11 @@ from policies.companion.guard.guard import GOES_ON_S, SHORT_OF_M
 from policies.companion.guard.limits import faded, stopping_speed
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
-from policies.companion.senses.image_fit import IMAGE_SHAPE, misfit
+from policies.companion.senses.image_fit import misfit
 from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
+from policies.tasks.follow_me.observe import IMAGE_SHAPE
 from policies.tasks.navigate.walking_goal import CLOSING_HZ
 
 KEPT_M = 1.5  # on the level, from an owner whose place is known

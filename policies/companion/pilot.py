@@ -24,8 +24,7 @@ from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.follow_me.observe import (
     EGO,
     EGO_BLIND,
-    IMAGE_CHANNELS,
-    IMAGE_SIZE,
+    IMAGE_SHAPE,
     LAYOUT_VERSION,
     TRACKED,
     vector_elements,
@@ -53,7 +52,7 @@ class LearnedPilot:
         PilotError: it was made for something else.
     """
 
-    image_shape = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))
+    image_shape = IMAGE_SHAPE
 
     def __init__(self, policy: Policy, source: str) -> None:
         layout = policy.layout
@@ -100,7 +99,7 @@ class TrackedPilot:
         PilotError: it was made for something else.
     """
 
-    image_shape = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))  # of the senses
+    image_shape = IMAGE_SHAPE  # of the senses
     kind = int(TRACKED)
 
     def __init__(self, policy: Policy, source: str) -> None:

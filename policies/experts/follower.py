@@ -14,8 +14,7 @@ from policies.shirt_detector import chest_hfrd
 from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.follow_me.observe import (
     EGO,
-    IMAGE_CHANNELS,
-    IMAGE_SIZE,
+    IMAGE_SHAPE,
     vector_elements,
 )
 
@@ -33,7 +32,7 @@ class ScriptedFollower:
     """Flies on the image where the owner is in it, on the phone's report where not, and on the range finder."""
 
     kind = int(EGO)
-    image_shape = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))
+    image_shape = IMAGE_SHAPE
 
     def __init__(self) -> None:
         self.owner_hfrd: Vector | None = None  # as a companion's `Pilot`

@@ -13,11 +13,18 @@ from numpy.typing import NDArray
 from common.attitude import Vector
 from mission.benchmark.any_pilot import CheckedPilot, OnnxNetwork, made_by_name
 from policies.companion.pilot import PilotError, load_pilot
-from policies.companion.senses.image_fit import IMAGE_SHAPE
 from policies.companion.skills.following import Pilot
 from policies.companion.skills.skill import Floats
 from policies.tasks.flight.own_state import ACTIONS
-from policies.tasks.follow_me.observe import EGO, EGO_BLIND, IMAGE_CHANNELS, IMAGE_SIZE, TRACKED, vector_elements
+from policies.tasks.follow_me.observe import (
+    EGO,
+    EGO_BLIND,
+    IMAGE_CHANNELS,
+    IMAGE_SHAPE,
+    IMAGE_SIZE,
+    TRACKED,
+    vector_elements,
+)
 from policies.tasks.follow_me.tracked.vector import TRACKED_ELEMENTS
 
 _ELEMENTS = {

@@ -3,9 +3,8 @@
 from math import isclose
 
 from common.image_stream import ImageFrame
-from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_CHANNELS, IMAGE_SIZE, TILT_DEG
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, TILT_DEG
 
-IMAGE_SHAPE = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))
 LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the images that policies are trained on
 OTHER_SIZE, OTHER_LENS = "pictures of another size", "pictures of another lens"
 _LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view

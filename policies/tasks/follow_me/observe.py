@@ -51,6 +51,7 @@ _SKY_M = wp.constant(1000.0)  # depths from here on are the sky's
 
 IMAGE_SIZE = 64  # [pixels]
 IMAGE_CHANNELS = ("red", "green", "blue", "depth")
+IMAGE_SHAPE = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))
 HFOV_DEG = 90.0
 LENS_FRD = (0.10, 0.0, 0.06)  # [m] of the lens from the vehicle's middle
 TILT_DEG = -10.0  # of the optical axis: below the horizon of a level vehicle

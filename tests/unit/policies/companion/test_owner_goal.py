@@ -12,12 +12,12 @@ from policies.companion.owner_goal import KEPT_M, OwnerGoal
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import Own, Owner
 from policies.person_detector.detector import Detection
-from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_CHANNELS, IMAGE_SIZE, TILT_DEG
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SHAPE, TILT_DEG
 from policies.tasks.navigate.walking_goal import CLOSING_HZ
 
 STEP_US = 20_000
 GUARD = GuardSettings()
-BLANK = np.full((IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS)), 128, np.uint8)
+BLANK = np.full(IMAGE_SHAPE, 128, np.uint8)
 
 
 class Camera:
