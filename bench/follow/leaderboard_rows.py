@@ -19,7 +19,7 @@ from common.intervals import Interval, bootstrap, rate
 
 ROWS = DOCS / "leaderboard.jsonl"
 CONDITIONS = ("walk", "run", "late-200", "gone-8", "no-depth", "twins")
-FLIGHTS = 4  # of each condition
+FLIGHTS = 8  # of each condition
 FIRST_SEED = 3_500_001
 SEEDS = tuple(FIRST_SEED + 2 * k for k in range(FLIGHTS))
 
