@@ -32,7 +32,7 @@ def sight_rows(
 ) -> None:
     """How a vehicle and its owner truly stood to each other, of every row."""
     i = wp.tid()
-    out[i] = see(worlds[0], truths[i], params[0], people[i], people[i].stature_m <= 0.0)
+    out[i] = see(worlds[0], truths[i], params[0], people[i], people[i])
 
 
 @wp.kernel(enable_backward=False)

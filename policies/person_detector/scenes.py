@@ -22,7 +22,7 @@ from sim.sensors.fast_camera.fast_camera import QuickCamera
 from sim.sensors.ray import PERSON
 from sim.world.batch import WorldBatch
 from sim.world.clothes import Clothes, any_clothes, usual_clothes
-from sim.world.people import CHEST_M, Person
+from sim.world.people import CHEST_M, STATURE_M, Person
 from sim.world.world import World, ground_height
 
 wp.set_module_options({"enable_backward": False})
@@ -227,7 +227,7 @@ def _label(
 ) -> None:
     """Of one person; whoever stands behind a nearer one counts for nothing."""
     stature_m = float(person["stature_m"])
-    chest_m = float(CHEST_M) / 1.75 * stature_m
+    chest_m = float(CHEST_M) / float(STATURE_M) * stature_m
     points = []
     for up in (chest_m, 0.93 * stature_m, 0.3 * stature_m):
         offset = person["pos_ned"] - np.array([0.0, 0.0, up]) - lens["pos_ned"]

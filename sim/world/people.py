@@ -23,6 +23,7 @@ PERSON_DT_S = PERSON_TICKS * TICK_S
 WALK_SPEED_M_S = 2.0  # people walk below and run above it; Baker et al. 2025 (arXiv 2501.00720): 1.9 to 3.0
 RUN_SPEED_M_S = 5.0  # 18 km/h: a brisk run
 
+STATURE_M = wp.constant(1.75)  # of a person of the usual size
 CHEST_M = wp.constant(1.0)  # above the feet: what a follower keeps its distance to, and where the phone is carried
 _EDGE_M = wp.constant(8.0)  # turns back this far from the edge of the map; guess
 _TURN = wp.constant(6.283185307179586)

@@ -173,8 +173,7 @@ def look(rig: RigArrays, state: FollowState, rows: wp.array(dtype=wp.bool)) -> N
     if rows[i]:
         truth = rig.truth[i]
         params = state.params[i]
-        is_hidden = state.drawn[i, 0].stature_m <= 0.0
-        state.sights[i] = see(rig.worlds[rig.i_world[i]], truth, params, state.people[i], is_hidden)
+        state.sights[i] = see(rig.worlds[rig.i_world[i]], truth, params, state.people[i], state.drawn[i, 0])
         state.lenses[i] = lens_in(truth, params)
 
 

@@ -50,7 +50,7 @@ def measure_rows(
     if drives == 1:
         truth.is_on_ground = 0
     is_standing = drives == 1 and wp.length(truth.vel_ned) < _STANDING_M_S
-    sight = see(worlds[i_world[i]], truth, params[i], people[i], drawn[i, 0].stature_m <= 0.0)
+    sight = see(worlds[i_world[i]], truth, params[i], people[i], drawn[i, 0])
     reach_m = sight.reach_m
     for k in range(bystanders.shape[1]):
         if bystanders[i, k].stature_m > 0.0:

@@ -14,7 +14,7 @@ from policies.tasks.follow_me.observe import HFOV_DEG, camera_mount
 from policies.tasks.follow_me.observe import LENS_FRD as MOUNT_FRD
 from sim.sensors.camera import Lens
 from sim.truth import Truth
-from sim.world.people import Person, chest_ned, is_line_free
+from sim.world.people import CHEST_M, STATURE_M, Person, chest_ned, is_line_free
 from sim.world.world import World, obstacle_contact
 
 wp.set_module_options({"enable_backward": False})
@@ -37,6 +37,9 @@ class Sight:
     vel_hfrd: wp.vec3  # [m/s] of the owner
     distance_m: float  # to the chest
     bearing_rad: float  # of the chest from the vehicle's heading, right positive
+    lower_m: (
+        float  # than CHEST_M above their feet: the middle of the chest that images show, of who is small or crouches
+    )
     reach_m: float  # to the nearest part of the owner's body
     room_m: float  # to the nearest trunk, crown, wall or ground, at most ROOM_MAX_M
     is_free: int  # nothing stands between lens and owner
@@ -96,12 +99,12 @@ def reach_from(pos_ned: wp.vec3, person: Person) -> float:
 
 
 @wp.func
-def see(w: World, truth: Truth, n: FollowParams, person: Person, is_hidden: bool) -> Sight:
-    """How a vehicle and its owner stand to each other; one who is hidden is in no picture."""
+def see(w: World, truth: Truth, n: FollowParams, person: Person, drawn: Person) -> Sight:
+    """How a vehicle and its owner stand to each other, who is drawn as cameras can see them: crouched, or not at all."""
     sight = Sight()
     chest = chest_ned(person)
-    head = person.pos_ned - wp.vec3(0.0, 0.0, _HEAD_FRACTION * person.stature_m)
-    legs = person.pos_ned - wp.vec3(0.0, 0.0, _LEG_FRACTION * person.stature_m)
+    head = person.pos_ned - wp.vec3(0.0, 0.0, _HEAD_FRACTION * drawn.stature_m)
+    legs = person.pos_ned - wp.vec3(0.0, 0.0, _LEG_FRACTION * drawn.stature_m)
     yaw = yaw_from_quat(truth.q_ned_from_frd)
     sight.position_hfrd = level_from_ned(chest - truth.pos_ned, yaw)
     sight.vel_hfrd = level_from_ned(person.vel_ned, yaw)
@@ -110,8 +113,9 @@ def see(w: World, truth: Truth, n: FollowParams, person: Person, is_hidden: bool
     sight.reach_m = reach_from(truth.pos_ned, person)
     sight.room_m = room_around(w, truth)
     lens = lens_in(truth, n)
-    if is_hidden:
+    if drawn.stature_m <= 0.0:
         return sight
+    sight.lower_m = CHEST_M * (1.0 - drawn.stature_m / STATURE_M)
     is_chest_free = is_line_free(w, lens.pos_ned, chest)
     is_head_free = is_chest_free or is_line_free(w, lens.pos_ned, head)
     sight.is_free = int(is_chest_free or is_head_free)

@@ -19,6 +19,7 @@ def sights(**numbers):
             "lens_scale": 1.0,
             "lens_distortion": 0.0,
             "owner_size": 1.0,
+            "owner_crouch_fraction": 0.0,
             "owner_hides_per_min": 0.0,
             "bystanders": 0.0,
             "depth_max_m": 50.0,
@@ -67,3 +68,11 @@ def test_a_lens_that_bends_lines_shifts_bearings_as_much_as_in_the_image(distort
     assert np.median(off_deg) < 0.2
     assert off_deg.max() < 1.0
     assert np.abs(expected[is_inside]).max() > 1.5
+
+
+@pytest.mark.parametrize(
+    ("numbers", "times_as_high"), [({"owner_size": 0.65}, 0.65), ({"owner_crouch_fraction": 1.0}, 0.55)]
+)
+def test_the_chest_of_who_is_small_or_crouches_is_shown_lower(numbers, times_as_high):
+    lower_m = (sights(**numbers) - sights())[:, 2]
+    assert np.median(lower_m) == pytest.approx((1.0 - times_as_high) * 1.0, abs=0.05)  # chests are a metre up, about
