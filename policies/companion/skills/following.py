@@ -131,13 +131,15 @@ class Following:
         if image is not None:
             self._image, self._image_us, self._is_new = image, time_us, True
             self._has_looked = self._is_tracked = False
+        if image is not None and misfit(image, self._pilot.image_shape):
+            image = None
         if self._senses is not None:
-            self._senses.sense(vehicle.own, self._owner, image if self._is_fit(image) else None)
+            self._senses.sense(vehicle.own, self._owner, image)
         if self._sight is not None and self.guard is not None:
-            self._sight.step(vehicle.own, image if self._is_fit(image) else None, time_us)
+            self._sight.step(vehicle.own, image, time_us)
             self.guard.vel_std = self._sight.std(vehicle.own)
         if self._recorder is not None:
-            self._recorder.sense(vehicle.own, self._owner, image if self._is_fit(image) else None)
+            self._recorder.sense(vehicle.own, self._owner, image)
         since_us = time_us - self._decided_us
         wait_us = DECISION_US + (-DECISION_EARLY_US if self._is_new else DECISION_LATE_US)
         return self._image is not None and since_us >= wait_us
@@ -159,10 +161,6 @@ class Following:
             vehicle.clock.pictured(image.time_us)
             self._is_early = image.time_us - vehicle.own.boot_us > IMAGE_EARLY_US
         return None if self._is_early else image
-
-    def _is_fit(self, image: ImageFrame | None) -> bool:
-        """Whether there is a picture, of the size that the pilot needs."""
-        return image is not None and image.pixels.shape == self._pilot.image_shape
 
     def loss(self, own: Own) -> str:
         if self.guard is not None and self._is_flying:
