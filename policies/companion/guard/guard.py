@@ -166,8 +166,8 @@ class Guard:
         """
         s, among = self.settings, self._is_among_others
         height_m = s.search_among_height_m if among else s.search_height_m
-        down = -CLIMB_M_S * float(np.clip(2.0 * (height_m - own.range_m), -0.5, 1.0))
-        down = down if isfinite(own.range_m) else 0.0
+        down = -CLIMB_M_S * float(np.clip(2.0 * (height_m - own.height_m), -0.5, 1.0))
+        down = down if isfinite(own.height_m) else 0.0
         if self.vel_std is not None:  # nobody searches where it does not know how far it has come
             has_known = self.senses.seen.sights > 0 and not is_searching
             turns = self._facing(self.senses.seen.now(own.boot_us)[0], own) if has_known else s.search_yaw_rate
@@ -253,7 +253,7 @@ class Guard:
 
     def _within_heights(self, down: float, own: Own) -> float:
         s = self.settings
-        if self._is_too_near and not own.range_m > s.height_max_m:
+        if self._is_too_near and not own.height_m > s.height_max_m:
             self._risen_us = own.boot_us
             if self._sinking_max < min(down, 0.0):
                 self.interventions.note(OVER_OWNER)
@@ -266,7 +266,7 @@ class Guard:
         room_m = self.senses.map.room_up_m(own.pos_ned, own.boot_us) - s.crown_m
         if isfinite(room_m):
             down = max(down, -stopping_speed(room_m, s.reaction_s, CLIMB_M_S))
-        kept = within_heights(down, own.range_m, s) if own.is_range_heard else 0.0
+        kept = within_heights(down, own.height_m, s) if own.is_range_heard else 0.0
         if abs(kept - allowed) > _COUNTED_M_S:
             self.interventions.note(HEIGHT)
         return kept

@@ -118,8 +118,8 @@ class Senses:
             sight = _sight(seen, pose)
             place = sight.place_ned
             self.seen.see(sight, pose)
-        if isfinite(own.range_m):
-            self._is_up = own.range_m > (_DOWN_M if self._is_up else _RISEN_M)
+        if isfinite(own.height_m):
+            self._is_up = own.height_m > (_DOWN_M if self._is_up else _RISEN_M)
         if not self._is_up:
             return
         owner_then = self._owner_then(image.time_us, own)

@@ -125,6 +125,16 @@ def test_a_height_that_it_does_not_let_be_flown_is_a_reason(
     assert HEIGHT in guard.interventions.latest
 
 
+def test_who_leans_is_as_high_as_the_ground_is_below_and_not_as_far_as_the_slant_range(
+    scene: tuple[Guard, Own, Sees],
+) -> None:
+    guard, own, _ = scene
+    flown(guard, own, 1.0)
+    own.q_ned_from_frd, own.range_m = quat_of(0.0, np.radians(-40.0)), 1.2
+    assert own.height_m < guard.settings.height_min_m
+    assert guard.filtered(((0.0, 0.0, 0.5), 0.0), own)[0][2] < -0.3
+
+
 def test_an_owner_who_was_never_seen_is_looked_for_before_it_is_the_end(scene: tuple[Guard, Own, Sees]) -> None:
     guard, own, sees = scene
     own.boot_us, sees.is_there = 500_000_000, False
