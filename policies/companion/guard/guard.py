@@ -18,6 +18,7 @@ from policies.companion.guard.interventions import (
     NEAR_SOMETHING,
     NO_DEPTH,
     NO_GNSS,
+    OLD_TELEMETRY,
     OVER_OWNER,
     OVER_SOMEBODY,
     TILTED,
@@ -123,6 +124,10 @@ class Guard:
         if self.stance is Stance.FREE and is_tilted(own.q_ned_from_frd, s):
             level = np.array(own.vel_ned[:2])  # asks for no more tilt
             self.interventions.note(TILTED)
+        if own.late_s > s.telemetry_slow_s:  # then ages on the vehicle's clock stand still
+            scale = faded(own.late_s, s.telemetry_slow_s, s.telemetry_stop_s)
+            level, down = scale * level, scale * down
+            self.interventions.note(OLD_TELEMETRY)
         let_be, people = self._past_people(self._by_sight(level), own)
         level = self._flown = self._past_solids(let_be, own, people)
         taken = let_be - level

@@ -6,7 +6,7 @@ import pytest
 from common.attitude import quat_of
 from common.image_stream import ImageFrame
 from policies.companion.guard.guard import Guard, Stance
-from policies.companion.guard.interventions import HEIGHT, NO_GNSS, TILTED
+from policies.companion.guard.interventions import HEIGHT, NO_GNSS, OLD_TELEMETRY, TILTED
 from policies.companion.guard.settings import GuardSettings, guard_settings
 from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
@@ -87,6 +87,17 @@ def test_pictures_that_get_old_are_said_to_be_what_makes_it_slower(scene: tuple[
     assert 0.0 < guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[0][0] < full
     assert guard.stance is Stance.LATE
     assert "slower: old pictures" in guard.interventions.latest
+
+
+def test_telemetry_that_stalls_slows_it_down_before_control_goes_back(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, _ = scene
+    flown(guard, own, 1.0)
+    full, slower, none = guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[0][0], [], []
+    for own.late_s, speeds in ((0.2, slower), (0.3, slower), (0.4, none), (0.5, none)):
+        speeds.append(guard.filtered(((3.0, 0.0, -0.5), 0.0), own)[0])
+    assert [speed for speed, *_ in slower] == [full, pytest.approx(1.5)]
+    assert none == [(0.0, 0.0, 0.0)] * 2
+    assert guard.interventions[OLD_TELEMETRY] == 3
 
 
 def test_who_leans_too_far_is_asked_to_go_on_as_it_does(scene: tuple[Guard, Own, Sees]) -> None:
