@@ -67,11 +67,12 @@ class Guard:
     """
 
     def __init__(self, settings: GuardSettings, senses: Senses) -> None:
-        self.settings = settings
+        self.settings = self._usual = settings
         self.senses = senses
         self._people, self._rollouts = PeopleRule(settings), Rollouts(settings)
         self.stance = Stance.FREE
         self.interventions = Interventions()
+        self._late_s = 0.0  # that setpoints are later than usual
         self._begun_us = 0  # when the policy took over, on the vehicle's clock
         self._flown = np.zeros(2)  # what was let be flown last
         self.goes_on_from = np.zeros(2)
@@ -92,6 +93,15 @@ class Guard:
         self._begun_us = own.boot_us
         self._flown = self.goes_on_from = np.array(own.vel_ned[:2])
         self._risen_us = NEVER_US
+
+    def reckon_with(self, late_s: float) -> None:
+        """Setpoints take so much longer [s] than usual to reach the vehicle."""
+        if late_s == self._late_s:
+            return
+        self._late_s, usual = late_s, self._usual
+        later = {"reaction_s": usual.reaction_s + late_s, "hears_s": usual.hears_s + late_s}
+        self.settings = usual.model_copy(update=later)
+        self._people, self._rollouts = PeopleRule(self.settings), Rollouts(self.settings)
 
     def is_lost(self, own: Own) -> bool:
         """Whether the owner was not seen for so long that it is the end; who has just begun may look for them first."""

@@ -15,6 +15,7 @@ from common.image_stream import ImageFrame
 from policies.companion.decision_log import NO_GOAL
 from policies.companion.guard.guard import Guard, Stance
 from policies.companion.guard.interventions import BeginningReasons, Interventions
+from policies.companion.guard.setpoint_delay import SetpointDelay
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
 from policies.companion.observation import Observer, image_layout
@@ -93,6 +94,7 @@ class Following:
             if self.guard is not None and self._senses is not None
             else None
         )
+        self._delay = SetpointDelay()
         after = (guard.return_s, guard.resume_s) if guard is not None and is_guarded else (0.0, 0.0)
         self.return_s, self.resume_s = after
         self._watch = OwnerWatch(hears=hears) if self._senses is None else self._senses.watch
@@ -124,6 +126,7 @@ class Following:
         self._vehicle = vehicle
         if self._sight is not None:
             self._sight.attach(vehicle)
+            self._delay.attach(vehicle)
 
     def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
         self._owner = vehicle.owner
@@ -138,6 +141,8 @@ class Following:
         if self._sight is not None and self.guard is not None:
             self._sight.step(vehicle.own, image, time_us)
             self.guard.vel_std = self._sight.std(vehicle.own)
+            self._delay.step(time_us)
+            self.guard.reckon_with(self._delay.late_s)
         if self._recorder is not None:
             self._recorder.sense(vehicle.own, self._owner, image)
         since_us = time_us - self._decided_us

@@ -59,6 +59,17 @@ def test_a_larger_distance_to_the_owner_is_kept(scene: tuple[Guard, Own, Sees]) 
     assert flown(far, own, 1.0)[-1] < near - 0.5
 
 
+def test_late_setpoints_make_it_stop_sooner_and_as_usual_it_is_as_it_was(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, _ = scene
+    own.vel_ned = (2.0, 0.0, 0.0)
+    usual = flown(guard, own, 1.0)[-1]
+    guard.reckon_with(0.08)
+    assert flown(guard, own, 1.0)[-1] < usual - 0.15
+    guard.reckon_with(0.0)
+    assert guard.settings == GuardSettings()
+    assert flown(guard, own, 1.0)[-1] == usual
+
+
 def test_what_was_seen_before_a_restart_is_not_taken_for_a_sight_of_now(scene: tuple[Guard, Own, Sees]) -> None:
     guard, own, sees = scene
     own.boot_us = 100_000_000
