@@ -21,7 +21,7 @@ from policies.companion.image_client import ImageSource
 from policies.companion.observation import Observer, image_layout
 from policies.companion.odometry.by_sight import BySight
 from policies.companion.owner_watch import OwnerWatch
-from policies.companion.senses.image_fit import misfit
+from policies.companion.senses.image_fit import NO_IMAGES, OTHER_CLOCK, misfit
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.tracked_observer import TrackedObserver
@@ -39,8 +39,6 @@ GUARDED_OLD_US = 2_500_000  # the guard stands still before
 LOOKED_UP_US = 10_000_000_000  # longer than anybody waits: what was overhead still is, where the vehicle stands
 SEEN_S = 1.0  # the last sight of who is in sight is no older
 OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
-NO_IMAGES = "no new pictures"
-OTHER_CLOCK = "pictures from the future"
 STANDING = (Stance.STOP, Stance.SEARCH, Stance.BLIND)
 
 

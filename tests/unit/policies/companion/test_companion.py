@@ -11,8 +11,8 @@ from common.image_stream import ImageFrame
 from policies.companion.companion import MISFIT, NO_DECISION, NOT_ALONE, Companion
 from policies.companion.engagement import Phase
 from policies.companion.guard.settings import GuardSettings
-from policies.companion.senses.image_fit import LENS, OTHER_LENS
-from policies.companion.skills.following import IMAGE_OLD_US, NO_IMAGES, OTHER_CLOCK, Following
+from policies.companion.senses.image_fit import LENS, NO_IMAGES, OTHER_CLOCK, OTHER_LENS
+from policies.companion.skills.following import IMAGE_OLD_US, Following
 from policies.companion.vehicle_link import COMPONENT
 from policies.experts.follower import ScriptedFollower
 
