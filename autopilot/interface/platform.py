@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from autopilot.interface.vehicle_state import Severity
 from autopilot.payload.camera.ports import FrameSource, ImageServer, VideoStream
 from autopilot.payload.camera.storage import MediaFolder
 from common.clock import SIMULATED_EPOCH_US
@@ -48,6 +49,10 @@ class LogStream(Protocol):
         ...
 
     def stop_listening(self, listener: LogListener) -> None: ...
+
+    def statustext(self, severity: Severity, text: str) -> None:
+        """Logs a text."""
+        ...
 
     def topics(self) -> Sequence[str]:
         """Names of what is logged."""

@@ -210,7 +210,7 @@ class Companion:
             is_alone=skill.is_alone(own),
             is_by_sight=skill.is_by_sight,
             is_covered=self._sending is not Sending.POLICY and skill.is_covered(own),
-            height_m=own.range_m,
+            height_m=own.height_m,
             pos_ned=own.pos_ned,
         )
 

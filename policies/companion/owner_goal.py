@@ -17,7 +17,7 @@ from policies.companion.guard.guard import GOES_ON_S, SHORT_OF_M
 from policies.companion.guard.limits import faded, stopping_speed
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
-from policies.companion.senses.image_fit import misfit
+from policies.companion.senses.image_fit import NO_IMAGES, OTHER_CLOCK, misfit
 from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
@@ -27,6 +27,7 @@ from policies.tasks.navigate.walking_goal import CLOSING_HZ
 KEPT_M = 1.5  # on the level, from an owner whose place is known
 DEVIATIONS = 2.0  # that it keeps away farther, of the error of their place
 IMAGE_OLD_US = 300_000  # guess: three images missed; then it goes by the phone alone
+BLIND_US = 2_500_000  # after so long without an image to go by it says so; as long as who follows by images waits
 LOST = "owner lost"
 _BRAKE_M_S2 = 1.0  # before where they are looked for
 
@@ -50,19 +51,14 @@ class OwnerGoal:
         self.may_search = False
         """It drives, under a guard: else who is lost is lost at once."""
         self._is_searching = False  # as told
-        self._wrong = ""  # with the newest image
+        self._wrong = NO_IMAGES  # with the newest image
+        self._taken_us: int | None = None  # when one came that nothing was wrong with, or it began; on our clock
+        self._is_blind = False  # as told: none came for long
 
     def frame(self, time_us: int) -> None:
         """Takes in what the camera sees, and what the phone has said."""
         own, owner = self._vehicle.own, self._vehicle.owner
-        image = self._camera.take(time_us)
-        if image is not None and self._is_unfit(image):
-            image = None
-        if image is not None and abs(own.boot_us - image.time_us) > IMAGE_OLD_US:
-            image = None
-        if image is not None:
-            self._vehicle.clock.pictured(image.time_us)
-        self._senses.sense(own, owner, image)
+        self._senses.sense(own, owner, self._taken(time_us))
         if abs(own.boot_us - self._known_us) > IMAGE_OLD_US:
             self._watch.update(own.boot_us, own, owner, None)
         self._owner = self._senses.owner_now(own)
@@ -70,13 +66,25 @@ class OwnerGoal:
             self._last = self._owner
         self._tell()
 
-    def _is_unfit(self, image: ImageFrame) -> bool:
-        """Whether the senses can make nothing of an image; says so once."""
-        wrong = misfit(image, IMAGE_SHAPE)
-        if wrong and wrong != self._wrong:
-            self._vehicle.say(f"Companion: {wrong}: by the phone alone", Severity.WARNING)
-        self._wrong = wrong
-        return bool(wrong)
+    def _taken(self, time_us: int) -> ImageFrame | None:
+        """A new image that the senses can make something of; where none comes for long it says so once."""
+        image = self._camera.take(time_us)
+        if image is not None:
+            self._vehicle.clock.pictured(image.time_us)
+            self._wrong = misfit(image, IMAGE_SHAPE) or self._off_clock(image)
+        if self._taken_us is None or (image is not None and not self._wrong):
+            self._taken_us, self._is_blind = time_us, False
+        if not self._is_blind and time_us - self._taken_us > BLIND_US:
+            self._is_blind = True
+            self._vehicle.say(f"Companion: {self._wrong or NO_IMAGES}: by the phone alone", Severity.WARNING)
+        return None if self._wrong else image
+
+    def _off_clock(self, image: ImageFrame) -> str:
+        """What is wrong with when an image was taken; "" if nothing is."""
+        ahead_us = image.time_us - self._vehicle.own.boot_us
+        if abs(ahead_us) <= IMAGE_OLD_US:
+            return ""
+        return OTHER_CLOCK if ahead_us > 0 else NO_IMAGES
 
     @property
     def _known_us(self) -> int:
@@ -95,9 +103,9 @@ class OwnerGoal:
 
     @property
     def is_searching(self) -> bool:
-        """They are neither seen nor heard of, and it may look for them."""
-        s = self._settings
-        return self.may_search and self._last is not None and s.search_s < self._silence_s <= s.lost_s
+        """They are neither seen nor heard of, and it may look for them, with a camera that shows something."""
+        s, may_find = self._settings, self.may_search and not self._is_blind
+        return may_find and self._last is not None and s.search_s < self._silence_s <= s.lost_s
 
     @property
     def goal(self) -> Goal | None:

@@ -84,6 +84,7 @@ class Own:
     pos_ned: Vector = (nan, nan, nan)  # [m]
     vel_ned: Vector = (nan, nan, nan)  # [m/s]
     position_us: int = NEVER_US
+    late_s: float = 0.0  # by now, since the older of the newest attitude and the newest position came in
     range_m: float = nan  # along the body's down axis; NaN: no return, or none heard of for RANGE_OLD_US
     range_us: int = NEVER_US
     heartbeat_us: int = NEVER_US
@@ -169,8 +170,10 @@ class VehicleLink:
                 self._owner_reported(decode(frame_of(frame)).fields, time_us)
             elif name is not None and sysid == self.system_id and compid == AUTOPILOT_COMPONENT:
                 self._vehicle_reported(name, decode(frame_of(frame)).fields, time_us)
-        if time_us - self.own.range_us >= RANGE_OLD_US:
-            self.own.range_m = nan
+        own = self.own
+        own.late_s = (time_us - min(own.attitude_us, own.position_us)) * 1e-6
+        if time_us - own.range_us >= RANGE_OLD_US:
+            own.range_m = nan
 
     def listen(self, name: str, listener: Listener, rate_hz: float = 0.0) -> None:
         """Has a listener called with messages of one kind, whoever sent them.

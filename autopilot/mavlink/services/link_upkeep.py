@@ -1,4 +1,7 @@
-"""What keeps a link in touch: heartbeats of clients, pings, their clocks, and the rates of the oldest stations."""
+"""What keeps a link in touch: heartbeats of clients, pings, their clocks, the rates of the oldest stations; texts to log.
+
+Texts of the vehicle's other components belong into its log, as PX4 has them: what a companion did, and why.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,6 +16,7 @@ from autopilot.mavlink.wire.codec import known_type
 
 _PING = known_type("PING")
 _TIMESYNC = known_type("TIMESYNC")
+_TEXT_PERIOD_US, _TEXT_BURST_US = 200_000, 10_000_000  # of texts that are logged: five a second, fifty at a time
 
 # What these say with a heartbeat is no client's first word: they want no greeting.
 _DEVICES = {
@@ -28,6 +32,7 @@ class LinkService(Service):
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
+        self._texts_due_us = 0  # by when those that were logged would be, if they came evenly
 
     def messages(self) -> Mapping[str, Handler]:
         return {
@@ -35,6 +40,7 @@ class LinkService(Service):
             "PING": self._ping_received,
             "TIMESYNC": self._timesync_received,
             "REQUEST_DATA_STREAM": self._data_stream_requested,
+            "STATUSTEXT": self._text_received,
         }
 
     def _heartbeat_received(self, sender: Sender, fields: Any) -> None:
@@ -58,6 +64,15 @@ class LinkService(Service):
         if fields.tc1 == 0:
             time_us = self._endpoint.clock.shown_us(self._endpoint.time_us)
             self._endpoint.reply(sender, _TIMESYNC, _TIMESYNC.pack(max(time_us, 1) * 1000, fields.ts1))
+
+    def _text_received(self, sender: Sender, fields: Any) -> None:
+        """Logs what another component of the vehicle says, piece by piece; what comes too often is left out."""
+        endpoint = self._endpoint
+        log, is_ours = endpoint.vehicle.host.log_stream, sender.sysid == endpoint.sysid
+        if log is None or not is_ours or self._texts_due_us > endpoint.time_us + _TEXT_BURST_US:
+            return
+        self._texts_due_us = max(self._texts_due_us, endpoint.time_us) + _TEXT_PERIOD_US
+        log.statustext(Severity(min(fields.severity, Severity.DEBUG)), fields.text)
 
     def _data_stream_requested(self, sender: Sender, fields: Any) -> None:
         """Sets the rate of a group of messages on this link (the old way)."""

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from common.attitude import rotated, yaw_of
 from common.range_sectors import RangeLayout
-from policies.companion.guard.interventions import HEIGHT, NEAR_SOMETHING, TILTED, TOO_FAST, Interventions
+from policies.companion.guard.interventions import (
+    HEIGHT,
+    NEAR_SOMETHING,
+    OLD_TELEMETRY,
+    TILTED,
+    TOO_FAST,
+    Interventions,
+)
 from policies.companion.guard.limits import (
     braking_speed,
     capped,
@@ -127,6 +134,10 @@ class GoalGuard:
             as_it_goes = capped(np.array(own.vel_ned[:2]), self.settings.speed_max)  # asks for no more tilt
             kept = np.zeros(2) if self._drives else as_it_goes
             self.interventions.note(TILTED)
+        if own.late_s > self.settings.telemetry_slow_s:  # then ages on the vehicle's clock stand still
+            heard = faded(own.late_s, self.settings.telemetry_slow_s, self.settings.telemetry_stop_s)
+            kept, scale = heard * kept, heard * scale
+            self.interventions.note(OLD_TELEMETRY)
         yaw_rate *= self._turning(level, kept, scale)
         return self._bounded(kept, scale * velocity[2], yaw_rate, own, age_s)
 

@@ -18,6 +18,7 @@ from policies.companion.guard.interventions import (
     NEAR_SOMETHING,
     NO_DEPTH,
     NO_GNSS,
+    OLD_TELEMETRY,
     OVER_OWNER,
     OVER_SOMEBODY,
     TILTED,
@@ -66,11 +67,12 @@ class Guard:
     """
 
     def __init__(self, settings: GuardSettings, senses: Senses) -> None:
-        self.settings = settings
+        self.settings = self._usual = settings
         self.senses = senses
         self._people, self._rollouts = PeopleRule(settings), Rollouts(settings)
         self.stance = Stance.FREE
         self.interventions = Interventions()
+        self._late_s = 0.0  # that setpoints are later than usual
         self._begun_us = 0  # when the policy took over, on the vehicle's clock
         self._flown = np.zeros(2)  # what was let be flown last
         self.goes_on_from = np.zeros(2)
@@ -91,6 +93,15 @@ class Guard:
         self._begun_us = own.boot_us
         self._flown = self.goes_on_from = np.array(own.vel_ned[:2])
         self._risen_us = NEVER_US
+
+    def reckon_with(self, late_s: float) -> None:
+        """Setpoints take so much longer [s] than usual to reach the vehicle."""
+        if late_s == self._late_s:
+            return
+        self._late_s, usual = late_s, self._usual
+        later = {"reaction_s": usual.reaction_s + late_s, "hears_s": usual.hears_s + late_s}
+        self.settings = usual.model_copy(update=later)
+        self._people, self._rollouts = PeopleRule(self.settings), Rollouts(self.settings)
 
     def is_lost(self, own: Own) -> bool:
         """Whether the owner was not seen for so long that it is the end; who has just begun may look for them first."""
@@ -123,6 +134,10 @@ class Guard:
         if self.stance is Stance.FREE and is_tilted(own.q_ned_from_frd, s):
             level = np.array(own.vel_ned[:2])  # asks for no more tilt
             self.interventions.note(TILTED)
+        if own.late_s > s.telemetry_slow_s:  # then ages on the vehicle's clock stand still
+            scale = faded(own.late_s, s.telemetry_slow_s, s.telemetry_stop_s)
+            level, down = scale * level, scale * down
+            self.interventions.note(OLD_TELEMETRY)
         let_be, people = self._past_people(self._by_sight(level), own)
         level = self._flown = self._past_solids(let_be, own, people)
         taken = let_be - level
@@ -166,8 +181,8 @@ class Guard:
         """
         s, among = self.settings, self._is_among_others
         height_m = s.search_among_height_m if among else s.search_height_m
-        down = -CLIMB_M_S * float(np.clip(2.0 * (height_m - own.range_m), -0.5, 1.0))
-        down = down if isfinite(own.range_m) else 0.0
+        down = -CLIMB_M_S * float(np.clip(2.0 * (height_m - own.height_m), -0.5, 1.0))
+        down = down if isfinite(own.height_m) else 0.0
         if self.vel_std is not None:  # nobody searches where it does not know how far it has come
             has_known = self.senses.seen.sights > 0 and not is_searching
             turns = self._facing(self.senses.seen.now(own.boot_us)[0], own) if has_known else s.search_yaw_rate
@@ -253,7 +268,7 @@ class Guard:
 
     def _within_heights(self, down: float, own: Own) -> float:
         s = self.settings
-        if self._is_too_near and not own.range_m > s.height_max_m:
+        if self._is_too_near and not own.height_m > s.height_max_m:
             self._risen_us = own.boot_us
             if self._sinking_max < min(down, 0.0):
                 self.interventions.note(OVER_OWNER)
@@ -266,7 +281,7 @@ class Guard:
         room_m = self.senses.map.room_up_m(own.pos_ned, own.boot_us) - s.crown_m
         if isfinite(room_m):
             down = max(down, -stopping_speed(room_m, s.reaction_s, CLIMB_M_S))
-        kept = within_heights(down, own.range_m, s) if own.is_range_heard else 0.0
+        kept = within_heights(down, own.height_m, s) if own.is_range_heard else 0.0
         if abs(kept - allowed) > _COUNTED_M_S:
             self.interventions.note(HEIGHT)
         return kept

@@ -26,6 +26,7 @@ _RISING = (
     ("search_s", "lost_s"),
     ("image_slow_s", "image_stop_s"),
     ("height_min_m", "height_max_m"),
+    ("telemetry_slow_s", "telemetry_stop_s"),
     ("scan_slow_s", "scan_stop_s"),
     ("dark_slow_s", "dark_stop_s"),
     ("sight_slow_std", "sight_stop_std"),
@@ -98,6 +99,11 @@ class GuardSettings(BaseModel):
     """From this age of the picture on it becomes slower ..."""
     image_stop_s: float = Field(default=0.8, gt=0.0, le=IMAGES_S)
     """... until it stands."""
+    telemetry_slow_s: float = Field(default=0.2, gt=0.0, le=IMAGES_S)
+    """Without attitude or position from the vehicle for so long it becomes slower: they come fifty times a second, and
+    what is known is told from where it was then; guess ..."""
+    telemetry_stop_s: float = Field(default=0.4, gt=0.0, le=IMAGES_S)
+    """... until it is asked to stand; after 0.5 s control goes back; guess."""
     owner_m: float = Field(default=OWNER_M, gt=0.0, le=20.0)
     """To the middle of the owner: it comes no nearer."""
     pressed_m: float = Field(default=2.0, gt=0.0, le=20.0)

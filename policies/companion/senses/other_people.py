@@ -102,10 +102,15 @@ class OtherPeople:
         """Those who were seen lately, in order, and how well they fit the phone."""
         return [Suitor(one.person.person_now(time_us), one.fit, one.person.looks) for one in self._lately(time_us)]
 
-    def now(self, time_us: int) -> list[PersonNow]:
-        """What is known of those who were seen lately and walk: whom a trunk is taken for does not."""
+    def now(self, time_us: int, *, may_stand: bool = False) -> list[PersonNow]:
+        """What is known of those who were seen lately and walk: whom a trunk is taken for does not.
+
+        Args:
+            time_us: the vehicle's clock.
+            may_stand: they need not walk.
+        """
         known = [one.person.person_now(time_us) for one in self._lately(time_us) if one.person.sights >= _SIGHTS]
-        return [person for person in known if float(np.hypot(*person.vel)) > _WALK_M_S]
+        return [person for person in known if may_stand or float(np.hypot(*person.vel)) > _WALK_M_S]
 
     def exchange(self, index: int, owner: Tracked | None, time_us: int) -> Tracked:
         """One of those who were heard is the owner, who was taken for the owner is another; the owner."""

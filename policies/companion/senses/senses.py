@@ -68,6 +68,7 @@ class Senses:
         """Where the vehicle was in the last seconds."""
         self.map = LocalMap()
         self._is_up = True  # until a range says otherwise
+        self._is_by_colours = False  # the newest image had no depth: who stands in it is on no map
         self.seen = SeenOwner()
         self.seen_us: int | None = None
         """When the newest image with the owner was taken, on the vehicle's clock."""
@@ -102,6 +103,7 @@ class Senses:
         if not has_depth(pixels[..., 3]):
             by_colours = self._mono_depth.see(pixels, down, own.range_m * down[2])
             pixels = np.concatenate([pixels[..., :3], by_colours.depth[..., None]], -1)
+        self._is_by_colours = by_colours is not None
         found = self._detector.find(pixels, (down[0], down[1]))
         if by_colours is not None:
             found = [replace(detection, has_depth=False) for detection in found]
@@ -116,8 +118,8 @@ class Senses:
             sight = _sight(seen, pose)
             place = sight.place_ned
             self.seen.see(sight, pose)
-        if isfinite(own.range_m):
-            self._is_up = own.range_m > (_DOWN_M if self._is_up else _RISEN_M)
+        if isfinite(own.height_m):
+            self._is_up = own.height_m > (_DOWN_M if self._is_up else _RISEN_M)
         if not self._is_up:
             return
         owner_then = self._owner_then(image.time_us, own)
@@ -185,7 +187,7 @@ class Senses:
 
     def others_now(self, own: Own) -> list[PersonNow]:
         """Where people are who were seen and not taken for the owner: one of them may be."""
-        return self._others.now(own.boot_us)
+        return self._others.now(own.boot_us, may_stand=self._is_by_colours)
 
     def _owner_then(self, time_us: int, own: Own) -> tuple[Floats, Floats] | None:
         """Where the owner was when an image was taken, and how fast; None: nobody knows."""

@@ -15,12 +15,13 @@ from common.image_stream import ImageFrame
 from policies.companion.decision_log import NO_GOAL
 from policies.companion.guard.guard import Guard, Stance
 from policies.companion.guard.interventions import BeginningReasons, Interventions
+from policies.companion.guard.setpoint_delay import SetpointDelay
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
 from policies.companion.observation import Observer, image_layout
 from policies.companion.odometry.by_sight import BySight
 from policies.companion.owner_watch import OwnerWatch
-from policies.companion.senses.image_fit import misfit
+from policies.companion.senses.image_fit import NO_IMAGES, OTHER_CLOCK, misfit
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.tracked_observer import TrackedObserver
@@ -38,8 +39,6 @@ GUARDED_OLD_US = 2_500_000  # the guard stands still before
 LOOKED_UP_US = 10_000_000_000  # longer than anybody waits: what was overhead still is, where the vehicle stands
 SEEN_S = 1.0  # the last sight of who is in sight is no older
 OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
-NO_IMAGES = "no new pictures"
-OTHER_CLOCK = "pictures from the future"
 STANDING = (Stance.STOP, Stance.SEARCH, Stance.BLIND)
 
 
@@ -93,6 +92,7 @@ class Following:
             if self.guard is not None and self._senses is not None
             else None
         )
+        self._delay = SetpointDelay()
         after = (guard.return_s, guard.resume_s) if guard is not None and is_guarded else (0.0, 0.0)
         self.return_s, self.resume_s = after
         self._watch = OwnerWatch(hears=hears) if self._senses is None else self._senses.watch
@@ -124,6 +124,7 @@ class Following:
         self._vehicle = vehicle
         if self._sight is not None:
             self._sight.attach(vehicle)
+            self._delay.attach(vehicle)
 
     def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
         self._owner = vehicle.owner
@@ -131,13 +132,17 @@ class Following:
         if image is not None:
             self._image, self._image_us, self._is_new = image, time_us, True
             self._has_looked = self._is_tracked = False
+        if image is not None and misfit(image, self._pilot.image_shape):
+            image = None
         if self._senses is not None:
-            self._senses.sense(vehicle.own, self._owner, image if self._is_fit(image) else None)
+            self._senses.sense(vehicle.own, self._owner, image)
         if self._sight is not None and self.guard is not None:
-            self._sight.step(vehicle.own, image if self._is_fit(image) else None, time_us)
+            self._sight.step(vehicle.own, image, time_us)
             self.guard.vel_std = self._sight.std(vehicle.own)
+            self._delay.step(time_us)
+            self.guard.reckon_with(self._delay.late_s)
         if self._recorder is not None:
-            self._recorder.sense(vehicle.own, self._owner, image if self._is_fit(image) else None)
+            self._recorder.sense(vehicle.own, self._owner, image)
         since_us = time_us - self._decided_us
         wait_us = DECISION_US + (-DECISION_EARLY_US if self._is_new else DECISION_LATE_US)
         return self._image is not None and since_us >= wait_us
@@ -159,10 +164,6 @@ class Following:
             vehicle.clock.pictured(image.time_us)
             self._is_early = image.time_us - vehicle.own.boot_us > IMAGE_EARLY_US
         return None if self._is_early else image
-
-    def _is_fit(self, image: ImageFrame | None) -> bool:
-        """Whether there is a picture, of the size that the pilot needs."""
-        return image is not None and image.pixels.shape == self._pilot.image_shape
 
     def loss(self, own: Own) -> str:
         if self.guard is not None and self._is_flying:

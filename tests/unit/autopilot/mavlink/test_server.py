@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -198,6 +200,19 @@ def test_timesync_request_is_answered_in_simulated_time():
     assert (answer.tc1, answer.ts1) == (rig.time_us * 1000, 123)
     rig.client.send("TIMESYNC", tc1=5, ts1=123)
     assert rig.all("TIMESYNC") == []
+
+
+def test_what_another_component_says_is_logged_unless_it_says_too_much():
+    rig, logged = Rig(), []
+    rig.vehicle.host.log_stream = SimpleNamespace(statustext=lambda severity, text: logged.append((severity, text)))
+    for sysid, compid, severity in ((1, 191, 5), (1, 191, 200), (255, 190, 5), (1, 1, 5)):
+        rig.client.link.send(encode("STATUSTEXT", sysid, compid, 0, severity=severity, text="guard: height"))
+        rig.frame()
+    assert logged == [(Severity.NOTICE, "guard: height"), (Severity.DEBUG, "guard: height")]
+    for _ in range(200):
+        rig.client.link.send(encode("STATUSTEXT", 1, 191, 0, severity=5, text="again"))
+        rig.frame()
+    assert 50 <= len(logged) <= 80
 
 
 def test_long_text_is_sent_in_chunks():

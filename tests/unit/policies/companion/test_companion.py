@@ -10,8 +10,9 @@ from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from common.image_stream import ImageFrame
 from policies.companion.companion import MISFIT, NO_DECISION, NOT_ALONE, Companion
 from policies.companion.engagement import Phase
-from policies.companion.senses.image_fit import LENS
-from policies.companion.skills.following import IMAGE_OLD_US, NO_IMAGES, OTHER_CLOCK, Following
+from policies.companion.guard.settings import GuardSettings
+from policies.companion.senses.image_fit import LENS, NO_IMAGES, OTHER_CLOCK, OTHER_LENS
+from policies.companion.skills.following import IMAGE_OLD_US, Following
 from policies.companion.vehicle_link import COMPONENT
 from policies.experts.follower import ScriptedFollower
 
@@ -25,9 +26,10 @@ class Images:
         self._pixels = np.zeros(shape, np.uint8)
 
     age_us = 0  # of each image when it comes in
+    lens = LENS
 
     def take(self, time_us):
-        return ImageFrame(time_us - self.age_us, 0, self._pixels, *LENS) if time_us % 100_000 == 0 else None
+        return ImageFrame(time_us - self.age_us, 0, self._pixels, *self.lens) if time_us % 100_000 == 0 else None
 
     def close(self):
         pass
@@ -53,11 +55,11 @@ class Air:
 
     mav_type = 2  # a quadrotor
 
-    def __init__(self):
+    def __init__(self, guard=None):
         companion_end, self.end = memory_pair(LinkRole.ONBOARD)
         self.pilot = Doubting()
         self.images = Images(self.pilot.image_shape)
-        self.companion = Companion(companion_end, Following(self.images, self.pilot))
+        self.companion = Companion(companion_end, Following(self.images, self.pilot, guard))
         self.mode = Mode.HOLD
         self.time_us = 0
         self._reader = FrameReader()
@@ -169,6 +171,18 @@ def test_pictures_that_telemetry_is_somewhat_later_than_are_flown_by():
     air.images.age_us = -300_000
     air.run(1.0)
     assert air.companion.phase is Phase.FLYING
+
+
+def test_pictures_of_another_lens_are_flown_by_by_nobody():
+    air = Air(GuardSettings())
+    air.run(1.0)
+    senses = air.companion.skill.guard.senses
+    taken_us = senses.image_us
+    assert taken_us > 0
+    air.images.lens = (70.0, *LENS[1:])
+    air.run(1.0)
+    assert air.companion.trouble == OTHER_LENS
+    assert senses.image_us == taken_us
 
 
 def test_one_picture_from_the_future_is_left_out():

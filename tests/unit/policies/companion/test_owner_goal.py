@@ -60,7 +60,7 @@ class Scene:
         self.shows = Shows()
         self.goal = OwnerGoal(self.vehicle, self.camera, Senses(detector=self.shows), GUARD)  # type: ignore[arg-type]
 
-    def pass_by(self, seconds, start_ned=None, vel_ned=(0.0, 0.0, 0.0), pixels=None, late_us=0):
+    def pass_by(self, seconds, start_ned=None, vel_ned=(0.0, 0.0, 0.0), pixels=None, late_us=0, hfov_deg=HFOV_DEG):
         """Time passes; the phone reports twice a second if it is there, and the camera shows pixels ten times."""
         own, owner = self.vehicle.own, self.vehicle.owner
         for step in range(round(seconds * 1e6) // STEP_US):
@@ -70,7 +70,7 @@ class Scene:
                 owner.pos_ned, owner.vel_ned, owner.std_m = tuple(moved), vel_ned, 0.3
                 owner.count += 1
             if pixels is not None and step % 5 == 0:
-                lens = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
+                lens = (hfov_deg, TILT_DEG, float(DEPTH_HALF_M))
                 self.camera.image = ImageFrame(own.boot_us - late_us, step, pixels, *lens)
             self.goal.frame(own.boot_us)
 
@@ -199,3 +199,33 @@ def test_images_that_it_can_make_nothing_of_are_said_once_and_it_goes_by_the_pho
     scene.pass_by(6.0, (20.0, 5.0, -1.0), pixels=np.full(shape, 128, np.uint8))
     assert scene.goal.goal.pos_ned[:2] == pytest.approx((20.0, 5.0), abs=0.5)
     assert scene.texts == ["Companion: pictures of another size: by the phone alone"]
+
+
+@pytest.mark.parametrize(
+    ("pixels", "late_us", "hfov_deg", "wrong"),
+    [
+        (None, 0, HFOV_DEG, "no new pictures"),
+        (BLANK, 400_000, HFOV_DEG, "no new pictures"),
+        (BLANK, -400_000, HFOV_DEG, "pictures from the future"),
+        (BLANK, 0, 70.0, "pictures of another lens"),
+    ],
+)
+def test_a_camera_that_shows_nothing_to_go_by_is_said_once_and_with_a_silent_phone_it_is_the_end(
+    pixels, late_us, hfov_deg, wrong
+):
+    scene = walking()
+    scene.pass_by(12.0, (8.0, 0.0, -1.0), pixels=pixels, late_us=late_us, hfov_deg=hfov_deg)
+    assert scene.goal.goal.pos_ned[:2] == pytest.approx((8.0, 0.0), abs=0.7)
+    assert scene.texts == [f"Companion: {wrong}: by the phone alone"]
+    scene.pass_by(GUARD.search_s + 1.0, pixels=pixels, late_us=late_us, hfov_deg=hfov_deg)
+    assert scene.goal.goal is None
+    assert len(scene.texts) == 1
+    scene.pass_by(1.0, (8.0, 0.0, -1.0), pixels=BLANK)
+    assert scene.goal.goal is not None
+
+
+def test_an_image_that_is_late_now_and_then_is_no_word():
+    scene = walking()
+    for late_us in (100_000, 400_000) * 10:
+        scene.pass_by(0.5, pixels=BLANK, late_us=late_us)
+    assert scene.texts == []

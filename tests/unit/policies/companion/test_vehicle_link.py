@@ -168,6 +168,16 @@ def test_an_attitude_that_was_overtaken_is_no_news_and_no_restart(vehicle):
     assert link.own.boot_us == 12_000_000
 
 
+def test_the_older_of_attitude_and_position_says_how_late_telemetry_is(vehicle):
+    end, link = vehicle
+    tell(end, link, "ATTITUDE_QUATERNION", q1=1.0)
+    assert link.own.late_s > 1e6
+    tell(end, link, "LOCAL_POSITION_NED", x=1.0)
+    assert link.own.late_s == 0.0
+    link.receive(300_000)
+    assert link.own.late_s == pytest.approx(0.3)
+
+
 def test_a_range_finder_that_falls_silent_tells_no_height(vehicle):
     end, link = vehicle
     tell(end, link, "ATTITUDE_QUATERNION", q1=1.0)

@@ -10,7 +10,7 @@ from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from common.attitude import quat_of
 from common.range_sectors import GROUND_RING, SCANNER, RangeLayout
 from policies.companion.guard.goal_guard import GoalGuard, GoalStance, NoseGuard
-from policies.companion.guard.interventions import TILTED
+from policies.companion.guard.interventions import OLD_TELEMETRY, TILTED
 from policies.companion.guard.limits import way_along_m
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.ranges import Ranges
@@ -266,6 +266,16 @@ def test_who_leans_too_far_with_old_ranges_still_stands() -> None:
     (level, _, _), _ = approach.guard.filtered(FULL_SPEED, approach.own)
     assert level == pytest.approx(0.0, abs=1e-6)
     assert approach.guard.stance is GoalStance.STOP
+
+
+def test_telemetry_that_stalls_slows_it_down_and_then_stops_it() -> None:
+    approach = Approach(GoalGuard(S, drives=False), SCANNER, 100.0, 0.0)
+    approach.fly(3.0, ((4.0, 0.0, 0.0), 0.0))
+    speeds = []
+    for approach.own.late_s in (0.2, 0.3, 0.4):
+        speeds.append(approach.guard.filtered(((4.0, 0.0, 0.0), 0.0), approach.own)[0][0])
+    assert speeds == pytest.approx([4.0, 2.0, 0.0], abs=1e-6)
+    assert approach.guard.interventions[OLD_TELEMETRY] == 2
 
 
 def test_old_scans_slow_a_rover_down_along_the_same_arc_and_it_does_not_turn_blind() -> None:

@@ -6,7 +6,7 @@ import pytest
 from common.attitude import quat_of
 from common.image_stream import ImageFrame
 from policies.companion.guard.guard import Guard, Stance
-from policies.companion.guard.interventions import HEIGHT, NO_GNSS, TILTED
+from policies.companion.guard.interventions import HEIGHT, NO_GNSS, OLD_TELEMETRY, TILTED
 from policies.companion.guard.settings import GuardSettings, guard_settings
 from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
@@ -59,6 +59,17 @@ def test_a_larger_distance_to_the_owner_is_kept(scene: tuple[Guard, Own, Sees]) 
     assert flown(far, own, 1.0)[-1] < near - 0.5
 
 
+def test_late_setpoints_make_it_stop_sooner_and_as_usual_it_is_as_it_was(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, _ = scene
+    own.vel_ned = (2.0, 0.0, 0.0)
+    usual = flown(guard, own, 1.0)[-1]
+    guard.reckon_with(0.08)
+    assert flown(guard, own, 1.0)[-1] < usual - 0.15
+    guard.reckon_with(0.0)
+    assert guard.settings == GuardSettings()
+    assert flown(guard, own, 1.0)[-1] == usual
+
+
 def test_what_was_seen_before_a_restart_is_not_taken_for_a_sight_of_now(scene: tuple[Guard, Own, Sees]) -> None:
     guard, own, sees = scene
     own.boot_us = 100_000_000
@@ -87,6 +98,17 @@ def test_pictures_that_get_old_are_said_to_be_what_makes_it_slower(scene: tuple[
     assert 0.0 < guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[0][0] < full
     assert guard.stance is Stance.LATE
     assert "slower: old pictures" in guard.interventions.latest
+
+
+def test_telemetry_that_stalls_slows_it_down_before_control_goes_back(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, _ = scene
+    flown(guard, own, 1.0)
+    full, slower, none = guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[0][0], [], []
+    for own.late_s, speeds in ((0.2, slower), (0.3, slower), (0.4, none), (0.5, none)):
+        speeds.append(guard.filtered(((3.0, 0.0, -0.5), 0.0), own)[0])
+    assert [speed for speed, *_ in slower] == [full, pytest.approx(1.5)]
+    assert none == [(0.0, 0.0, 0.0)] * 2
+    assert guard.interventions[OLD_TELEMETRY] == 3
 
 
 def test_who_leans_too_far_is_asked_to_go_on_as_it_does(scene: tuple[Guard, Own, Sees]) -> None:
@@ -123,6 +145,16 @@ def test_a_height_that_it_does_not_let_be_flown_is_a_reason(
     kept = guard.filtered(((0.0, 0.0, down), 0.0), own)[0][2]
     assert abs(kept - down) > 0.29
     assert HEIGHT in guard.interventions.latest
+
+
+def test_who_leans_is_as_high_as_the_ground_is_below_and_not_as_far_as_the_slant_range(
+    scene: tuple[Guard, Own, Sees],
+) -> None:
+    guard, own, _ = scene
+    flown(guard, own, 1.0)
+    own.q_ned_from_frd, own.range_m = quat_of(0.0, np.radians(-40.0)), 1.2
+    assert own.height_m < guard.settings.height_min_m
+    assert guard.filtered(((0.0, 0.0, 0.5), 0.0), own)[0][2] < -0.3
 
 
 def test_an_owner_who_was_never_seen_is_looked_for_before_it_is_the_end(scene: tuple[Guard, Own, Sees]) -> None:

@@ -149,3 +149,12 @@ def test_without_a_range_finder_images_are_taken_in(scene: Scene) -> None:
     scene.own.range_m = float("nan")
     scene.look(byte=80)
     assert np.isfinite(scene.senses.map.nearest_m(scene.own.pos_ned, 0.0, scene.own.boot_us)).any()
+
+
+@pytest.mark.parametrize(("byte", "count"), [(200, 0), (255, 1)])
+def test_who_stands_in_the_way_counts_where_no_depth_puts_them_on_the_map(scene: Scene, byte: int, count: int) -> None:
+    scene.look((5.0, 0.0), times=10, byte=byte)
+    scene.look((5.0, 0.0), (2.5, 0.6), times=5, byte=byte)
+    others = scene.senses.others_now(scene.own)
+    assert len(others) == count
+    assert all(person.pos_ned[:2] == pytest.approx([2.5, 0.6], abs=0.1) for person in others)
