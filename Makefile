@@ -46,7 +46,7 @@ train-demo: $(STAMP) ## Train Parking1 from nothing while you watch, then look a
 reproduce-cars: $(STAMP) ## Train every row of docs/results/cars.md from scratch (hours); one row anew: ARGS="--shipped --again parking1"
 	@$(BIN)/python -m bench.cars $(ARGS)
 
-reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow.md (hours); flags: ARGS="student"
+reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow.md, three seeds of each (hours; a third of them: ARGS="--seeds 1"); flags: ARGS="student"
 	@$(BIN)/python -m bench.follow $(ARGS)
 
 reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in two legs of three seeds, choose and judge it (three quarters of an hour); without training: ARGS="judge"

@@ -2,9 +2,9 @@
 
 Stages that are done (results/follow/STAGE-SEED.json) are kept and stopped ones go on; `--again` trains them anew,
 `--page` only writes the page, `--shipped` takes what the shipped page was made of (docs/results/follow.jsonl) as done.
-Policies stay in results/follow/; `--publish` puts them in the place of those that ship: of several seeds of a stage the
-one that is best in worlds of validation (`bench.follow.choice`). Whether it is better than what ships is not asked:
-look at the page first. Two processes go side by side, each on a core of its own; a stage waits for those it needs, and
+Policies stay in results/follow/; `--publish` puts them in the place of those that ship: of at least three seeds of a
+stage the one that is best in worlds of validation (`bench.follow.choice`). Whether it is better than what ships is not
+asked: look at the page first. Two processes go side by side, each on a core of its own; a stage waits for those it needs, and
 one that takes several cores for all others to end.
 """
 
@@ -33,13 +33,14 @@ from policies.learn.export.policy_file import load_policy
 RESULTS = Path("results/follow")
 RUNS = DOCS / "follow.jsonl"
 PRETRAINED = Path(__file__).parents[2] / "policies" / "pretrained"
+SEEDS = 3  # the fewest that what ships is chosen among
 console = Console(highlight=False)
 Choose = Callable[[Sequence[Path], Stage], tuple[Path, Interval]]
 
 
 def main(
     names: Annotated[list[str] | None, typer.Argument(help="Stages, with those they need; default: all.")] = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Seeds of each.")] = 1,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds of each.")] = SEEDS,
     jobs: Annotated[int, typer.Option(min=1, help="Cores: each process has one, or all.")] = 2,
     again: Annotated[bool, typer.Option("--again", help="Train the named stages and those after them anew.")] = False,
     page: Annotated[bool, typer.Option("--page", help="Train nothing, only write the page.")] = False,
@@ -96,23 +97,22 @@ def _take(result: Result, folder: Path) -> None:
 
 
 def published(results_folder: Path, pretrained: Path, choose: Choose = best_of) -> list[str]:
-    """Puts policies among those that ship, under the names of their recipes; says which.
+    """Puts policies among those that ship, under the names of their recipes; says which, and of which seeds are missing.
 
     Args:
         results_folder: where they were trained.
         pretrained: where those that ship are.
-        choose: the best of several seeds' of a stage.
+        choose: the best of the seeds' of a stage.
     """
     lines = []
     for stage, trained in _trained(results_folder):
         ships = pretrained / f"{stage.recipe}.pt"
+        if len(trained) < SEEDS:
+            lines.append(f"{ships.name}: stays: of {stage.name} {len(trained)} of the {SEEDS} seeds are trained")
+            continue
         before = ships.read_bytes() if ships.exists() else b""
-        if len(trained) == 1:
-            best = trained[0]
-            write_whole(ships, best.read_bytes())
-        else:
-            best, found = choose(trained, stage)
-            write_judged(best, ships, MEASURES[stage.figure], found, EPISODES)
+        best, found = choose(trained, stage)
+        write_judged(best, ships, MEASURES[stage.figure], found, EPISODES)
         if ships.read_bytes() != before:
             lines.append(f"{ships.name}: ships now what lies in {best}")
     return lines

@@ -7,14 +7,14 @@ hour.
 """
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
 from bench.follow.judge import first_episodes
-from mission.follow.benchmark.conditions import AIRFRAME, BY_NAME
+from mission.follow.benchmark.conditions import AIRFRAME, BY_NAME, Condition
 from policies.learn.export.policy_file import load_policy
 from policies.tasks.follow_me.follow_me import FollowMe
 from policies.tasks.follow_me.follow_me_params import FOLLOW_PARAMS, SEEN_BY_TRACKER
@@ -26,7 +26,9 @@ EPISODES = 96
 _COSTS = ("_cost", "_reward", "_width_m", "_width_deg")
 _USUAL = {n.name: n.default for n in FOLLOW_PARAMS if n.name in SEEN_BY_TRACKER and not n.name.endswith(_COSTS)}
 _AIR = {"wind_m_s": 4.0, "wind_gust_m_s": 1.5, "trees_per_ha": 100.0}
-_IN_BATCH = [name for name, condition in BY_NAME.items() if condition.airframe == AIRFRAME]  # what training has
+_IN_BATCH = [  # what training has: one airframe, and GNSS
+    name for name, each in BY_NAME.items() if each.airframe == AIRFRAME and each.gnss_away_s is None
+]
 _SPEEDS_M_S = {"walk": WALK_SPEED_M_S, "run": RUN_SPEED_M_S}
 
 
@@ -48,14 +50,17 @@ def main(
         stack = policy.layout.stack
         task = FollowMe(FollowSettings(observation="tracked", owner="any", split="test", stack=stack), EPISODES)
         for name in names:
-            pace, wind_m_s = BY_NAME[name].pace, BY_NAME[name].wind_m_s
-            numbers = {**BY_NAME[name].numbers, "wind_m_s": _AIR["wind_m_s"] if wind_m_s is None else wind_m_s}
-            tracks, _ = first_episodes(
-                policy, task, {**_USUAL, **_AIR, "owner_speed_max": _SPEEDS_M_S[pace], "guard": guard, **numbers}
-            )
+            tracks, _ = first_episodes(policy, task, {**numbers_of(BY_NAME[name]), "guard": guard})
             card = scorecard(tracks)
             table.add_row(str(path), name, written(card.in_band, "%"), written(card.collision, "%"))
     Console().print(table)
+
+
+def numbers_of(condition: Condition) -> dict[str, Any]:
+    """FollowMe's numbers that make a condition in batch."""
+    given = {"wind_m_s": condition.wind_m_s} if condition.wind_m_s is not None else {}
+    own = {"owner_speed_max": _SPEEDS_M_S[condition.pace], "sensor_roughness": condition.sensor_roughness}
+    return {**_USUAL, **_AIR, **own, **given, **condition.numbers}
 
 
 if __name__ == "__main__":

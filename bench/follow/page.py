@@ -26,7 +26,7 @@ make reproduce-follow
 ```
 
 What comes of it stays in `results/follow/`, and the policies that ship are kept: with `ARGS="--publish"` the best
-of the seeds that were trained (`--seeds 3`) take their place.
+of three seeds of each stage take their place; one seed, in a third of the time, is `ARGS="--seeds 1"`.
 
 A teacher that sees the truth is trained by PPO; students that see what flies (a 64 x 64 picture with depth, the flight
 controller's estimate and, but for vision-only, the phone's reports) learn from it by DAgger; PPO may go on with what

@@ -71,7 +71,7 @@ def judged_parking(policies: Mapping[str, Path], split: Split) -> Judged:
         found[name] = {
             condition: _in_words({key: values[is_reverse == lot.is_reverse] for key, values in figures.items()})
             for condition, lot in LOTS.items()
-            if lot.cart_count == _CARTS
+            if lot.cart_count == _CARTS and lot.lag_s == 0.0
         }
     return found
 

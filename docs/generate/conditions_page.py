@@ -47,6 +47,8 @@ def _differences(condition: Condition) -> str:
     parts = [f"`{name}` {value:g}" for name, value in condition.numbers.items()]
     if condition.wind_m_s is not None:
         parts.append(f"wind of {condition.wind_m_s:g} m/s")
+    if condition.sensor_roughness:
+        parts.append(f"`sensor_roughness` {condition.sensor_roughness:g}")
     if condition.airframe != AIRFRAME:
         parts.append(f"airframe `{condition.airframe}`")
     if condition.gnss_away_s is not None:

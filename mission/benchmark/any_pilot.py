@@ -12,6 +12,11 @@ from policies.companion.pilot import PilotError
 from policies.companion.skills.skill import Floats
 
 
+def is_class(name: str) -> bool:
+    """Whether a name is module:Class, and not that of a file or folder whose path has a colon."""
+    return ":" in name and not Path(name).exists()
+
+
 def made_by_name(name: str, parts: tuple[str, ...]) -> Any:
     """What a class makes that is named module:Class, looked for in the working folder too.
 

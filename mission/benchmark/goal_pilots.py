@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mission.benchmark.any_pilot import CheckedPilot, OnnxNetwork, made_by_name
+from mission.benchmark.any_pilot import CheckedPilot, OnnxNetwork, is_class, made_by_name
 from policies.companion.pilot import PilotError
 from policies.companion.skills.skill import Floats
 from policies.companion.vector_pilot import VectorPilot
@@ -34,7 +34,7 @@ def goal_pilot(name: str, kind: type[P], stack: int) -> P:
     made: Any
     if name.endswith(".onnx"):
         made = OnnxGoalPilot(Path(name), kind.task.frame_size)
-    elif ":" in name:
+    elif is_class(name):
         made = made_by_name(name, ("reset", "act"))
     else:
         try:

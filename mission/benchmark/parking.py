@@ -41,12 +41,15 @@ class Lot:
     title: str
     is_reverse: bool
     cart_count: int
+    lag_s: float = 0.0  # of the ranges
 
 
 CONDITIONS = {
     "park": Lot("the tail to the aisle", False, 2),
     "reverse": Lot("the nose to the aisle", True, 2),
     "calm": Lot("the tail to the aisle, no carts", False, 0),
+    "late-100": Lot("the tail to the aisle, ranges 100 ms late", False, 2, 0.1),
+    "late-200": Lot("the tail to the aisle, ranges 200 ms late", False, 2, 0.2),
 }
 
 
@@ -63,6 +66,15 @@ class Parking:
     why: str
 
 
+def flight_of(lot: Lot, seed: int, rng: np.random.Generator) -> FlightConfig:
+    """What a drive in a condition is made from; how noisy its sensors are is drawn."""
+    world = CAR_PARK.model_copy(update={"seed": seed, "mover_count": lot.cart_count})
+    return FlightConfig(
+        airframe="rover", has_lidar=True, has_base=True, world=world, seed=seed, noise=rng.uniform(0.5, 1.5),
+        scan_lag_s=lot.lag_s, parameters=REVERSES,
+    )  # fmt: skip
+
+
 def parked(pilot: DrivingPilot, lot: Lot, seed: int, guard: GuardSettings, kept: KeptFlight | None = None) -> Parking:
     """One drive.
 
@@ -76,11 +88,7 @@ def parked(pilot: DrivingPilot, lot: Lot, seed: int, guard: GuardSettings, kept:
     pilot.reset()
     kept = kept or KeptFlight()
     rng = np.random.default_rng([seed, 0x5041])
-    world = CAR_PARK.model_copy(update={"seed": seed, "mover_count": lot.cart_count})
-    config = FlightConfig(
-        airframe="rover", has_lidar=True, has_base=True, world=world, seed=seed, noise=rng.uniform(0.5, 1.5),
-        parameters=REVERSES,
-    )  # fmt: skip
+    config = flight_of(lot, seed, rng)
     flight, companion = flight_with_driver(config, pilot, folder=kept.folder, guard=guard)
     kept.begin(flight, companion)
     try:

@@ -46,7 +46,8 @@ def card_rows(card: PolicyCard) -> Iterator[tuple[str, str]]:
         yield "reward, training", f"{card.figures['training_reward']:.3f}"
     yield "code", _code(card.code)
     if card.teacher:
-        yield "teacher", f"{card.teacher['policy']}: {_leg(card.teacher['card'])}; {card.teacher['sha256'][:12]}"
+        known_by = card.teacher.get("weights_sha256", card.teacher.get("sha256", ""))  # older cards: of the whole file
+        yield "teacher", f"{card.teacher['policy']}: {_leg(card.teacher['card'])}; {known_by[:12]}"
     for data in card.data:
         said = ", ".join(f"{name} {data[name]}" for name in _OF_DATASET if name in data)
         yield f"data, {data['use']}", f"{data['path']}: {said}"

@@ -81,6 +81,13 @@ CONDITIONS = (
     ),
     Condition("red", "red clothes", "walk", {"owner_hue": 0.0}, 0.9),
     Condition("clothes", "any clothes, any size", "walk", {"owner_clothes_fraction": 1.0, "owner_size": 0.85}, 0.9),
+    Condition(
+        "crouch",
+        "crouches wherever they stop, which is often",
+        "walk",
+        {"owner_crouch_fraction": 1.0, "owner_stop_share": 0.35},
+        0.9,
+    ),
     Condition("dusk", "dusk", "walk", {"light": 0.12}, 0.9),
     Condition("blur", "pictures blurred by 33 ms", "walk", {"shutter_s": 0.033}, 0.9),
     Condition("wind", "wind of 10 m/s", "walk", {}, 0.9, wind_m_s=10.0),

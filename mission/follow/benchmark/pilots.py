@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.attitude import Vector
-from mission.benchmark.any_pilot import CheckedPilot, OnnxNetwork, made_by_name
+from mission.benchmark.any_pilot import CheckedPilot, OnnxNetwork, is_class, made_by_name
 from policies.companion.pilot import PilotError, load_pilot
 from policies.companion.skills.following import Pilot
 from policies.companion.skills.skill import Floats
@@ -45,10 +45,21 @@ def any_pilot(name: str) -> Pilot:
     Raises:
         PilotError: no such one, or it does not fit FollowMe.
     """
+    made: Any
     if name.endswith(".onnx"):
-        return OnnxPilot(Path(name))
-    if ":" not in name:
+        made = OnnxPilot(Path(name))
+    elif is_class(name):
+        made = _made(name)
+    else:
         return load_pilot(name)
+    vector, image = np.zeros(len(_ELEMENTS[made.kind]), np.float32), np.zeros(IMAGE_SHAPE, np.uint8)
+    checked: Any = CheckedPilot(made, name, len(ACTIONS), vector, image)
+    pilot: Pilot = checked
+    return pilot
+
+
+def _made(name: str) -> Any:
+    """What a class of anybody's makes, which says what it is shown."""
     made = made_by_name(name, ("kind", "image_shape", "reset", "act"))
     if made.kind not in list(_ELEMENTS):
         raise PilotError(f"{name}: kind {made.kind}: must be one of {', '.join(map(str, _ELEMENTS))}")
@@ -56,10 +67,7 @@ def any_pilot(name: str) -> Pilot:
         raise PilotError(f"{name}: image_shape {made.image_shape}: must be {IMAGE_SHAPE}")
     if not hasattr(made, "owner_hfrd"):
         made.owner_hfrd = None
-    vector, image = np.zeros(len(_ELEMENTS[made.kind]), np.float32), np.zeros(IMAGE_SHAPE, np.uint8)
-    checked: Any = CheckedPilot(made, name, len(ACTIONS), vector, image)
-    pilot: Pilot = checked
-    return pilot
+    return made
 
 
 class OnnxPilot:

@@ -41,7 +41,7 @@ class PolicyCard:
     code: dict[str, str] = field(default_factory=dict)
     """Version and commit of the code that trained it; empty: of before this was kept, as of the next two."""
     teacher: dict[str, Any] = field(default_factory=dict)
-    """The policy whose actions it learnt: name, hash and card; empty: it had none."""
+    """The policy whose actions it learnt: name, its weights' hash and card; empty: it had none."""
     data: list[dict[str, Any]] = field(default_factory=list)
     """The datasets that it learnt from: where each lay, what for, and of whom; empty: from none."""
 

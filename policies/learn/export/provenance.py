@@ -1,7 +1,7 @@
 """What a policy was made by and of, for its card: the code that trained it, its teacher, and its datasets.
 
-In: the configuration of a run. Out: plain values. A file is known by its hash, wherever it is moved; a dataset, which
-may be large, by what its metadata says.
+In: the configuration of a run. Out: plain values. A policy is known by the hash of its weights, wherever its file is
+moved and whatever its card comes to say; a dataset, which may be large, by what its metadata says.
 """
 
 import hashlib
@@ -19,6 +19,7 @@ from policies.learn.config.behavior import Behavior, DaggerHyperparameters
 from policies.learn.config.signals import GailSettings
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy
+from policies.learn.networks.policy import Policy
 from policies.learn.rollout.demonstrations import data_folders
 
 ROOT = Path(__file__).parents[3]  # of the repository, if it lies in one
@@ -64,16 +65,24 @@ def _git(root: Path, *words: str) -> str | None:
 
 
 def teacher_record(behavior: Behavior) -> dict[str, Any]:
-    """The policy whose actions are learnt: its name, hash and card; empty: there is none.
+    """The policy whose actions are learnt: its name, its weights' hash and its card; empty: there is none.
 
     Raises:
         CheckpointError: it cannot be read.
     """
     if not isinstance(behavior.hyperparameters, DaggerHyperparameters):
         return {}
-    path = find_policy(behavior.hyperparameters.teacher)
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    return {"policy": behavior.hyperparameters.teacher, "sha256": digest, "card": asdict(load_policy(path)[1])}
+    name = behavior.hyperparameters.teacher
+    policy, card = load_policy(find_policy(name))
+    return {"policy": name, "weights_sha256": weights_sha256(policy), "card": asdict(card)}
+
+
+def weights_sha256(policy: Policy) -> str:
+    """The hash of the names, shapes and bytes of a policy's weights, in order of names."""
+    digest = hashlib.sha256()
+    for name, weights in sorted(policy.state_dict().items()):
+        digest.update(f"{name} {tuple(weights.shape)} ".encode() + weights.cpu().numpy().tobytes())
+    return digest.hexdigest()
 
 
 def data_records(behavior: Behavior) -> list[dict[str, Any]]:

@@ -1,5 +1,6 @@
 """The reproduction of following: order of stages, results kept whole, and a page that says what they say."""
 
+import inspect
 import math
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 
 from bench.cars.page import DOCS
 from bench.cars.result import Point
-from bench.follow.__main__ import RUNS, _jobs, _take, published, results, unpublished
+from bench.follow.__main__ import RUNS, _jobs, _take, main, published, results, unpublished
 from bench.follow.choice import best_first
 from bench.follow.page import duration, write_page
 from bench.follow.result import Judged, Result, read, read_all, write, write_all
@@ -80,6 +81,10 @@ def shipped(name):
     return pretrained(name).read_bytes()
 
 
+def second(paths, stage):  # noqa: ARG001
+    return paths[1], Interval(0.8, 0.7, 0.9)
+
+
 def test_policies_that_ship_stay_unless_new_ones_are_published(tmp_path):
     results, ships = tmp_path / "results", tmp_path / "pretrained"
     results.mkdir()
@@ -87,33 +92,46 @@ def test_policies_that_ship_stay_unless_new_ones_are_published(tmp_path):
     old, new, same = (shipped(name) for name in ("follow-me-late", "follow-me-tracked", "follow-me-teacher"))
     (ships / "follow-me-tracked.pt").write_bytes(old)
     (ships / "follow-me-teacher.pt").write_bytes(same)
-    made = {"tracked-1": new, "teacher-1": same, "tuned-1": old}
+    made = {"tracked": new, "teacher": same, "tuned": old}
     for name, content in made.items():
-        (results / f"{name}.pt").write_bytes(content)
+        for seed in (1, 2, 3):
+            (results / f"{name}-{seed}.pt").write_bytes(content)
     (line,) = unpublished(results, ships)
-    assert line == f"{results / 'tracked-1.pt'}: not follow-me-tracked.pt, which still ships: --publish"
+    assert line.endswith(f"{results / 'tracked-3.pt'}: not follow-me-tracked.pt, which still ships: --publish")
     assert (ships / "follow-me-tracked.pt").read_bytes() == old
-    assert len(published(results, ships)) == 1
-    assert (ships / "follow-me-tracked.pt").read_bytes() == new
+    lines = published(results, ships, second)
+    assert f"follow-me-tracked.pt: ships now what lies in {results / 'tracked-2.pt'}" in lines
     assert {path.name for path in ships.iterdir()} == {"follow-me-tracked.pt", "follow-me-teacher.pt"}
     assert not unpublished(results, ships)
 
 
-def test_of_several_seeds_the_chosen_is_published_whichever_shipped_and_says_what_it_was_chosen_by(tmp_path):
+def test_nothing_is_published_of_fewer_than_three_seeds(tmp_path):
+    ships = tmp_path / "pretrained"
+    ships.mkdir()
+    for seed in (1, 2):
+        (tmp_path / f"late-{seed}.pt").write_bytes(shipped("follow-me-late"))
+    (ships / "follow-me-late.pt").write_bytes(shipped("follow-me-tracked"))
+    assert published(tmp_path, ships, second) == ["follow-me-late.pt: stays: of late 2 of the 3 seeds are trained"]
+    assert (ships / "follow-me-late.pt").read_bytes() == shipped("follow-me-tracked")
+    assert inspect.signature(main).parameters["seeds"].default == 3
+
+
+def test_of_the_seeds_the_chosen_is_published_whichever_shipped_and_says_what_it_was_chosen_by(tmp_path):
     ships = tmp_path / "pretrained"
     ships.mkdir()
     (tmp_path / "late-1.pt").write_bytes(shipped("follow-me-late"))
     (tmp_path / "late-2.pt").write_bytes(shipped("follow-me-tracked"))
+    (tmp_path / "late-3.pt").write_bytes(shipped("follow-me-late"))
     (tmp_path / "tracked-student-1.pt").write_bytes(shipped("follow-me-teacher"))  # of a stage that does not ship
     (ships / "follow-me-late.pt").write_bytes(shipped("follow-me-late"))
     asked = []
 
-    def second(paths, stage):
+    def choose(paths, stage):
         asked.append(([path.name for path in paths], stage.figure))
-        return paths[1], Interval(0.8, 0.7, 0.9)
+        return second(paths, stage)
 
-    assert len(published(tmp_path, ships, second)) == 1
-    assert asked == [(["late-1.pt", "late-2.pt"], "in_band")]
+    assert len(published(tmp_path, ships, choose)) == 1
+    assert asked == [(["late-1.pt", "late-2.pt", "late-3.pt"], "in_band")]
     _, card = load_policy(ships / "follow-me-late.pt")
     assert (card.figures["band_low"], card.figures["band_high"]) == (0.7, 0.9)
     assert not unpublished(tmp_path, ships)  # the card differs, the policy does not

@@ -48,7 +48,7 @@ def honeyguide(*words):
     ("words", "sentence"),
     [
         (("navigate", "--condition", "rain"), "--condition rain: there are 200-late-0, 200-late-100,"),
-        (("park", "--condition", "rain"), "--condition rain: there are park, reverse, calm"),
+        (("park", "--condition", "rain"), "--condition rain: there are park, reverse, calm, late-100, late-200"),
         (("navigate", "--policy", "drive-park"), "made for another task"),
         (("park", "--policy", "builtins:dict"), "a pilot has reset, act too"),
         (("park", "--policy", "nowhere.onnx"), "nowhere.onnx"),
@@ -60,7 +60,7 @@ def test_what_is_wrong_is_refused_in_a_sentence(words, sentence):
     assert sentence in result.stderr
 
 
-@pytest.mark.parametrize(("task", "condition"), [("navigate", "200-late-100"), ("park", "calm")])
+@pytest.mark.parametrize(("task", "condition"), [("navigate", "200-late-100"), ("park", "late-200")])
 def test_a_flight_is_shown_and_written(task, condition, tmp_path):
     out = tmp_path / "out"
     words = ("--condition", condition, "--flights", "1", "--seed", "3940001", "--jobs", "1")
@@ -99,6 +99,13 @@ def test_a_recorded_flight_goes_as_another_and_becomes_a_dataset(task, condition
     again = honeyguide(task, *words, "--record", str(flights))
     assert again.exit_code == 2
     assert f"--record: {flights / condition}-seed{seed} is there already" in again.stderr
+
+
+@pytest.mark.parametrize(("condition", "lag_s"), [("park", 0.0), ("late-100", 0.1), ("late-200", 0.2)])
+def test_the_rover_of_a_late_condition_has_late_ranges_and_is_else_the_same(condition, lag_s):
+    lots = (parking.CONDITIONS[name] for name in (condition, "park"))
+    late, fresh = (parking.flight_of(lot, 5, np.random.default_rng(5)) for lot in lots)
+    assert late == fresh.model_copy(update={"scan_lag_s": lag_s})
 
 
 def test_the_guard_keeps_a_rover_at_full_throttle_off_what_stands_round_it():

@@ -7,10 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
+from onnx import TensorProto, helper, save
 from typer.testing import CliRunner
 
 from mission.benchmark import session
 from mission.benchmark.any_pilot import CheckedPilot
+from mission.benchmark.benchmark import benchmark_of
 from mission.benchmark.goal_pilots import goal_pilot
 from mission.benchmark.session import BenchmarkOptions, benchmark_session
 from mission.cli import app
@@ -18,6 +20,7 @@ from mission.follow.benchmark.flights import Outcome
 from mission.follow.benchmark.pilots import any_pilot
 from policies.companion.pilot import PilotError
 from policies.companion.vector_pilot import NavigationPilot
+from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.follow_me.observe import EGO
 
 FLOWN = Outcome(3, 0.99, False, False, 1.5, float("nan"), None, None, True, 10.0, 0.5, 5.0, 60.0, "")
@@ -103,6 +106,38 @@ def test_a_mistake_in_flight_names_what_made_it():
     made.act = Raises().act
     with pytest.raises(PilotError, match="mine: act: RuntimeError: out of ideas"):
         pilot.act(np.zeros(3), np.zeros(1))
+
+
+@pytest.mark.parametrize(
+    ("task", "inputs"),
+    [
+        ("follow", {"vector": (TensorProto.FLOAT, [1, 21]), "image": (TensorProto.UINT8, [1, 64, 64, 4])}),
+        ("follow", {"vector": (TensorProto.DOUBLE, [1, 55])}),
+        ("navigate", {"vector": (TensorProto.DOUBLE, [1, 138])}),
+    ],
+)
+def test_a_network_of_the_right_shapes_and_other_types_is_refused_before_anything_is_flown(tmp_path, task, inputs):
+    path = tmp_path / "policy.onnx"
+    taken = [helper.make_tensor_value_info(name, *of) for name, of in inputs.items()]
+    given = helper.make_tensor_value_info("action", TensorProto.FLOAT, [1, 4])
+    nodes = [
+        helper.make_node("Constant", [], ["row"], value_floats=[0.0] * 4),
+        helper.make_node("Constant", [], ["shape"], value_ints=[1, 4]),
+        helper.make_node("Reshape", ["row", "shape"], ["action"]),
+    ]
+    graph = helper.make_graph(nodes, "other-types", taken, [given])
+    save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), path)
+    result = CliRunner().invoke(app, ["benchmark", task, "--policy", str(path)])
+    assert result.exit_code == 2
+    assert f"{path}: act: InvalidArgument: " in " ".join(result.stderr.split())
+    assert "Traceback" not in result.stderr
+
+
+@pytest.mark.parametrize(("task", "policy"), [("follow", "follow-me-tracked"), ("park", "drive-park")])
+def test_a_file_whose_path_has_a_colon_is_a_file(tmp_path, task, policy):
+    path = tmp_path / "2026-01-01T12:30.pt"
+    path.write_bytes(pretrained(policy).read_bytes())
+    assert benchmark_of(task).load(str(path)) is not None
 
 
 @pytest.mark.parametrize("stack", [None, "3", 0])

@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from bench.follow.conditions import _IN_BATCH, numbers_of
 from common.airframe import load_airframe
+from docs.generate.conditions_page import conditions_text
 from mission.benchmark.kept_flight import KeptFlight
 from mission.benchmark.session import misses
 from mission.cli import app
+from mission.flight import Flight
 from mission.follow.benchmark.conditions import BY_NAME, CONDITIONS
 from mission.follow.benchmark.flights import Outcome, _has_resumed, _has_stood, _is_kept, flight_of, fly
 from mission.follow.benchmark.pilots import any_pilot
@@ -20,6 +23,7 @@ from policies.companion.pilot import PilotError
 from policies.datasets.reader import DatasetReader
 from policies.tasks.follow_me.follow_me_params import FOLLOW_PARAMS
 from policies.tasks.follow_me.observe import EGO, TRACKED
+from tests.unit.mission.follow.goto_flight import advance
 
 
 class FullSpeedAhead:
@@ -72,6 +76,31 @@ def test_conditions_can_be_told_apart():
 def test_a_condition_sets_wind_and_airframe():
     flights = [flight_of(BY_NAME[name], 2_000_003) for name in ("walk", "wind", "f550")]
     assert [(each.wind_m_s, each.airframe) for each in flights] == [(2.0, "x500"), (10.0, "x500"), (2.0, "f550")]
+
+
+def test_an_owner_who_crouches_does_so_before_the_camera_and_not_on_their_phone():
+    flight = Flight(flight_of(BY_NAME["crouch"], 2_000_003))
+    try:
+        advance(flight, 0.2)
+        rows = flight.owner.cast.rows
+        drawn, owner = rows.drawn.numpy()[0, 0], rows.people.numpy()[0]
+        assert drawn["stature_m"] == pytest.approx(0.55 * owner["stature_m"])
+        assert drawn["pos_ned"] == pytest.approx(owner["pos_ned"])
+    finally:
+        flight.close()
+
+
+def test_in_batch_a_condition_is_of_all_that_sets_it_apart_or_is_not_judged():
+    assert not {"f450", "f550", "no-gnss"} & {*_IN_BATCH}
+    usual = numbers_of(BY_NAME["walk"])
+    for name in {*_IN_BATCH} - {"walk"}:
+        assert numbers_of(BY_NAME[name]) != usual, name
+    assert numbers_of(BY_NAME["rough"]) == {**usual, "sensor_roughness": 1.0}
+    assert numbers_of(BY_NAME["wind"]) == {**usual, "wind_m_s": 10.0}
+
+
+def test_the_page_says_what_each_condition_differs_by():
+    assert "| `rough` | walks | `sensor_roughness` 1 |" in conditions_text()
 
 
 def test_a_flight_is_shown_and_written(tmp_path):

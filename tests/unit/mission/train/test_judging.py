@@ -33,7 +33,7 @@ def test_a_card_shows_where_a_policy_comes_from(finished):
 def test_a_cards_rows_name_teacher_data_and_the_legs_before():
     parent = {"task": "Hover", "seed": 4, "steps": 500, "code": {"version": "1", "commit": "abc"}}
     data = {"path": "shown", "use": "gail", "episodes": 3, "pilot": "expert"}
-    teacher = {"policy": "master", "sha256": "0123456789abcdef", "card": parent}
+    teacher = {"policy": "master", "weights_sha256": "0123456789abcdef", "card": parent}
     figures = {"success_rate": 0.9, "success_low": 0.88, "success_high": 0.92, "episodes": 2000}
     rows = dict(card_rows(PolicyCard("Hover", {}, 1, 9, figures, {}, [parent], {}, teacher, [data])))
     assert rows["success, judged"] == "90.00 % (95 %: 88.00 to 92.00) of 2,000 episodes that it did not train on"

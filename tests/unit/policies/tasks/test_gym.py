@@ -1,8 +1,12 @@
 """Tasks as Gymnasium environments: what their arguments mean, what is refused, and what copies keep."""
 
 import copy
+import os
 import pickle
 import re
+import subprocess
+import sys
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -14,6 +18,8 @@ from policies.tasks.catalogue import CATALOGUE, UnknownTask, settings_class
 from policies.tasks.episode import Outcome
 from policies.tasks.gym import TaskEnv, TaskVectorEnv
 from policies.tasks.task_params import NumberError, Sampler
+
+ROOT = Path(__file__).parents[4]
 
 
 def test_a_reset_mask_begins_its_rows_and_leaves_the_others():
@@ -248,3 +254,28 @@ def test_what_critics_may_see_is_shown_where_it_is_asked_for():
     assert np.array_equal(plain["vector"], observation["vector"])
     with pytest.raises(UnknownTask, match="RollerBall: has_privileged: as it is set it has no privileged elements"):
         TaskEnv("RollerBall", has_privileged=True)
+
+
+INSTALLED = """
+import sys
+import gymnasium
+import policies
+assert "gentle_tasks" not in sys.modules
+assert "honeyguide/Broken-v0" in gymnasium.registry
+observation, _ = gymnasium.make("honeyguide/Gentle-v0").reset(seed=1)
+assert observation.shape == gymnasium.make("honeyguide/RollerBall-v0").reset(seed=1)[0].shape
+"""
+
+
+def test_tasks_of_installed_packages_are_environments_too_and_a_broken_one_breaks_nothing_else(tmp_path):
+    package = tmp_path / "gentle-1.0.dist-info"
+    package.mkdir()
+    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: gentle\nVersion: 1.0\n")
+    given = ("Gentle = gentle_tasks:Gentle", "Broken = broken_tasks:Nothing", "no ID = gentle_tasks:Gentle")
+    (package / "entry_points.txt").write_text("\n".join(["[honeyguide.tasks]", *given]))
+    (tmp_path / "gentle_tasks.py").write_text("from policies.tasks.roller_ball import RollerBall as Gentle\n")
+    (tmp_path / "broken_tasks.py").write_text("raise RuntimeError\n")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    command = [sys.executable, "-c", INSTALLED]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path, env=environment)
+    assert done.returncode == 0, done.stderr

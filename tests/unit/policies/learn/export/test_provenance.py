@@ -1,14 +1,24 @@
 """What a card says of where a policy comes from: the commit of its code, its teacher, its datasets."""
 
-import hashlib
 import subprocess
 
+import pytest
 from rich.console import Console
 
+from bench.judged_card import write_judged
+from common.intervals import Interval
 from mission.train.demonstrate import DemonstrateOptions, demonstrate_task
 from policies.learn.config.behavior import Behavior
+from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy
-from policies.learn.export.provenance import CHANGED, UNKNOWN, commit_of, data_records, teacher_record
+from policies.learn.export.provenance import (
+    CHANGED,
+    UNKNOWN,
+    commit_of,
+    data_records,
+    teacher_record,
+    weights_sha256,
+)
 
 WHO = ("-c", "user.name=a", "-c", "user.email=a@example.com")
 
@@ -36,13 +46,30 @@ def test_the_commit_is_that_of_the_repository_whose_root_it_is_and_changes_are_n
     assert commit_of(tmp_path) == UNKNOWN
 
 
-def test_a_teacher_is_known_by_its_hash_and_its_card():
+def test_a_teacher_is_known_by_the_hash_of_its_weights_and_its_card():
     behavior = Behavior(trainer_type="dagger", hyperparameters={"teacher": "follow-me-teacher"})
     record = teacher_record(behavior)
     assert record["policy"] == "follow-me-teacher"
-    assert record["sha256"] == hashlib.sha256(find_policy("follow-me-teacher").read_bytes()).hexdigest()
+    assert record["weights_sha256"] == weights_sha256(load_policy(find_policy("follow-me-teacher"))[0])
     assert (record["card"]["task"], record["card"]["seed"]) == ("FollowMe", 1)
     assert teacher_record(Behavior()) == {}
+
+
+def test_the_hash_of_weights_stays_where_the_card_changes_and_changes_with_a_weight(tmp_path):
+    source, judged = find_policy("follow-me-teacher"), tmp_path / "judged.pt"
+    write_judged(source, judged, "band", Interval(0.9, 0.8, 1.0), 8)
+    policy = load_policy(judged)[0]
+    assert judged.read_bytes() != source.read_bytes()
+    assert weights_sha256(policy) == weights_sha256(load_policy(source)[0])
+    next(policy.parameters()).data.view(-1)[0] += 1.0
+    assert weights_sha256(policy) != weights_sha256(load_policy(source)[0])
+
+
+@pytest.mark.parametrize("student", ["follow-me-late", "follow-me-tracked"])
+def test_the_teacher_that_a_shipped_student_names_ships(student):
+    card = load_policy(find_policy(student))[1]
+    teacher = card.teacher or card.parents[-1]["teacher"]
+    assert teacher["weights_sha256"] == weights_sha256(load_policy(find_policy(teacher["policy"]))[0])
 
 
 def test_datasets_are_known_by_what_they_are_for_and_of_whom(tmp_path):
