@@ -1,5 +1,7 @@
 """Tasks, learning and trained policies. Importing it registers the tasks with Gymnasium, where that is installed."""
 
+from contextlib import suppress
+
 from policies.tasks.catalogue import CATALOGUE, task_names
 
 try:
@@ -8,7 +10,7 @@ except ModuleNotFoundError:  # it comes with the extra `gym`; a policy flies wit
     pass
 else:
     for _name in task_names():  # those of installed packages too, whose modules are imported where they are made
-        try:
+        with suppress(gymnasium.error.Error):  # a package's name of which Gymnasium makes no ID
             gymnasium.register(
                 id=f"honeyguide/{_name}-v0",
                 entry_point="policies.tasks.gym:TaskEnv",
@@ -16,5 +18,3 @@ else:
                 max_episode_steps=CATALOGUE[_name].max_episode_steps if _name in CATALOGUE else None,
                 kwargs={"task": _name},
             )
-        except gymnasium.error.Error:  # a package's name of which Gymnasium makes no ID
-            pass

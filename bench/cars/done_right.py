@@ -95,6 +95,14 @@ OTHERS = (
         judged=PARKING2_SPOTS,
         document="stacks three; 32.8 / 47.2 / 22.8 %",
     ),
+    Experiment(
+        "parking2-seen-stack",
+        "Parking 2, document's observation, last three stacked",
+        "parking2",
+        settings={"observation": "as-documented", "rays": 14, "stack": 3},
+        judged=PARKING2_SPOTS,
+        document="stacks three; 32.8 / 47.2 / 22.8 %",
+    ),
     Experiment("parking1-sac", "SAC", "parking1-sac", judged=(NEW_SPOTS,), document="unstable, abandoned after 20 h"),
     Experiment(
         "roller-ball-hyper",

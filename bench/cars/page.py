@@ -18,8 +18,10 @@ _COLUMNS = (
 )
 INTRODUCTION = """# The two car documents, trained anew
 
-What 'Learning to Drive with Unity ML-Agents' and 'Park It Right!' report, and what the same tasks come to here. All of
-this page is made by one command, from nothing, which takes hours on two cores and goes on where it was when stopped:
+What 'Learning to Drive with Unity ML-Agents' and 'Park It Right!' report, and what the same tasks come to here. Its
+tables and curves are made by one command, from nothing, which takes hours on two cores and goes on where it was when
+stopped; what the remarks under them say of other runs, such as those tried in one seed, is of their day, and the
+picture of failures is another command's:
 
 ```sh
 make reproduce-cars

@@ -3,9 +3,9 @@
 Stages that are done (results/follow/STAGE-SEED.json) are kept and stopped ones go on; `--again` trains them anew,
 `--page` only writes the page, `--shipped` takes what the shipped page was made of (docs/results/follow.jsonl) as done.
 Policies stay in results/follow/; `--publish` puts them in the place of those that ship: of at least three seeds of a
-stage the one that is best in worlds of validation (`bench.follow.choice`). Whether it is better than what ships is not
-asked: look at the page first. Two processes go side by side, each on a core of its own; a stage waits for those it needs, and
-one that takes several cores for all others to end.
+stage the one that is best in worlds of validation (`bench.follow.choice`). Whether it is better than what ships is
+not asked: look at the page first. Two processes go side by side, each on a core of its own; a stage waits for those it
+needs, and one that takes several cores for all others to end.
 """
 
 import shutil
@@ -97,7 +97,7 @@ def _take(result: Result, folder: Path) -> None:
 
 
 def published(results_folder: Path, pretrained: Path, choose: Choose = best_of) -> list[str]:
-    """Puts policies among those that ship, under the names of their recipes; says which, and of which seeds are missing.
+    """Puts policies among those that ship, under the names of their recipes; says which, and where seeds are missing.
 
     Args:
         results_folder: where they were trained.

@@ -81,7 +81,7 @@ def shipped(name):
     return pretrained(name).read_bytes()
 
 
-def second(paths, stage):  # noqa: ARG001
+def second(paths, stage):
     return paths[1], Interval(0.8, 0.7, 0.9)
 
 
