@@ -32,6 +32,7 @@ WORLDS = 64
 _ROUNDS = 16  # of images in the same worlds
 _NOBODY = 0.3  # share of images
 _EMPTY, _SOMEBODY, _UNSURE = 0, 1, 2
+HEIGHTS_M = (0.6, 4.0)  # of lenses above the ground
 _SPREAD_M = 90.0  # from the middle of the world, where images are taken
 _AT_HOME, _HOME_M = 0.2, 6.0  # share of images taken near the pad, on which somebody may be thought to stand
 _POINTS_LEAST = 2  # of chest, head and knees that must be seen
@@ -78,13 +79,22 @@ class Stage:
         seed: of everything.
         is_test: in worlds that no other split has.
         count: of vehicles and worlds.
+        heights_m: of the lenses above the ground, from and to.
         device: a Warp device.
     """
 
-    def __init__(self, seed: int, *, is_test: bool = False, count: int = WORLDS, device: str = "cpu") -> None:
+    def __init__(
+        self,
+        seed: int,
+        *,
+        is_test: bool = False,
+        count: int = WORLDS,
+        heights_m: tuple[float, float] = HEIGHTS_M,
+        device: str = "cpu",
+    ) -> None:
         self.rng = np.random.default_rng([seed, int(is_test)])
         self.count = count
-        self._is_test, self._turns = is_test, 0
+        self._is_test, self._turns, self._heights_m = is_test, 0, heights_m
         start_warp()  # makes the CPU the default, once
         with wp.ScopedDevice(device):
             self._worlds = WorldBatch(FOLLOW_WORLD, count, device, trees_per_ha_max=300.0)
@@ -111,7 +121,7 @@ class Stage:
                 _grow(self._worlds, self.rng, is_test=self._is_test)
                 self.camera.refresh()
             self._turns += 1
-            self.height_m = _place(self._worlds, self.camera, self._people, self._clothes, self.rng)
+            self.height_m = _place(self._worlds, self.camera, self._people, self._clothes, self._heights_m, self.rng)
 
     def images(self) -> NDArray[np.uint8]:
         """What the cameras see, as a companion gets it: (count, height, width, 4)."""
@@ -122,9 +132,9 @@ class Stage:
             return np.asarray(self._packed.numpy().copy())
 
 
-def scenes(count: int, seed: int, *, is_test: bool = False) -> Scenes:
+def scenes(count: int, seed: int, *, is_test: bool = False, heights_m: tuple[float, float] = HEIGHTS_M) -> Scenes:
     """At least so many images; of worlds that no other split has."""
-    stage, parts = Stage(seed, is_test=is_test), []
+    stage, parts = Stage(seed, is_test=is_test, heights_m=heights_m), []
     for _ in range(-(-count // WORLDS)):
         stage.place()
         parts.append((stage.images(), *_labels(stage.camera, stage.people)))
@@ -148,7 +158,12 @@ def _seeds(drawn: NDArray[np.int64], *, is_test: bool) -> NDArray[np.int64]:
 
 
 def _place(
-    worlds: WorldBatch, camera: QuickCamera, people: Any, clothes: Any, rng: np.random.Generator
+    worlds: WorldBatch,
+    camera: QuickCamera,
+    people: Any,
+    clothes: Any,
+    heights_m: tuple[float, float],
+    rng: np.random.Generator,
 ) -> NDArray[np.float64]:
     """Puts vehicles into their worlds, people before them, and the light and the lens on: their heights [m]."""
     n, k = people.shape
@@ -174,7 +189,7 @@ def _place(
     people.assign(row)
     is_usual = wp.array((rng.random((n, k)) < 0.15).astype(np.int32), dtype=int)
     wp.launch(_dress, (n, k), [int(rng.integers(2**31)), is_usual, usual_clothes(), clothes])
-    height_m = rng.uniform(0.6, 4.0, n)
+    height_m = rng.uniform(*heights_m, n)
     _aim(camera, rng, where, -ground[:, 0] - height_m, yaw)
     return np.asarray(height_m)
 

@@ -18,14 +18,16 @@ from torch import Tensor
 from torch.nn import functional
 
 from common.intervals import rate
+from policies.companion.senses.low_detector import LowDetector
 from policies.image_layers import save_weights
 from policies.person_detector.detector import SURE, WEIGHTS, DetectorNetwork, PersonDetector, shipped
-from policies.person_detector.scenes import Scenes, scenes
+from policies.person_detector.scenes import HEIGHTS_M, Scenes, scenes
 
 BATCH = 128
 RATE = 2e-3
 _FOCUS = 2.0
 _RANGE_WEIGHT = 0.1
+_LOW_M = (0.25, 0.5)  # lenses on a rover
 
 
 def train(images: int, epochs: int, seed: int, console: Console) -> DetectorNetwork:
@@ -90,9 +92,9 @@ def _best_logits(network: DetectorNetwork, there: Scenes) -> NDArray[np.float64]
     return torch.cat(parts).double().numpy()
 
 
-def judge(network: DetectorNetwork, there: Scenes) -> dict[str, Any]:
+def judge(network: DetectorNetwork, there: Scenes, kind: type[PersonDetector] = PersonDetector) -> dict[str, Any]:
     """How often it sees who is there, and somebody where nobody is, as it flies; how true its probabilities are."""
-    detector, counts = PersonDetector(network), there.has_person | there.is_empty
+    detector, counts = kind(network), there.has_person | there.is_empty
     seen, ghosts = (rate(is_sure(detector, there.images[rows])) for rows in (there.has_person, there.is_empty))
     probability = 1.0 / (1.0 + np.exp(-_best_logits(network, there)))
     bins = np.digitize(probability[counts], np.linspace(0.1, 0.9, 9))
@@ -130,12 +132,16 @@ def main(
     seed: int = 1,
     out: Path = WEIGHTS,
     judged: Annotated[bool, typer.Option("--judge", help="Train nothing: judge the one that ships.")] = False,
+    low: Annotated[
+        bool, typer.Option("--low", help="Judge it as on a rover: near the ground, helped by blue shirts.")
+    ] = False,
 ) -> None:
     console = Console(highlight=False)
     network = shipped().eval() if judged else train(images, epochs, seed, console)
     if not judged:
         save_weights(network, out)
-    found = judge(network, scenes(6400, 7, is_test=True))
+    there = scenes(6400, 7, is_test=True, heights_m=_LOW_M if low else HEIGHTS_M)
+    found = judge(network, there, LowDetector if low else PersonDetector)
     for name, value in found.items():
         console.print(f"{name}: {value}")
 

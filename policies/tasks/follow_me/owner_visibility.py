@@ -100,7 +100,7 @@ def reach_from(pos_ned: wp.vec3, person: Person) -> float:
 
 @wp.func
 def see(w: World, truth: Truth, n: FollowParams, person: Person, drawn: Person) -> Sight:
-    """How a vehicle and its owner stand to each other, who is drawn as cameras can see them: crouched, or not at all."""
+    """How a vehicle and its owner stand to each other, who is drawn as cameras see them: crouched, or not at all."""
     sight = Sight()
     chest = chest_ned(person)
     head = person.pos_ned - wp.vec3(0.0, 0.0, _HEAD_FRACTION * drawn.stature_m)
