@@ -37,7 +37,7 @@ from mission.flight_settings import OURS, FollowOptions
 from mission.follow.companion_process import latency_text
 from mission.follow.follow_options import follow_config
 from mission.follow.follow_scoring import FollowWatch, Smoothness, taken_over
-from mission.follow.guard_report import guard_figures, guard_text
+from mission.follow.guard_report import guard_figures, guard_row, guard_text
 from mission.follow.lockstep import flight_with_companion
 from mission.kernel_loading import load_kernels
 from mission.run_folder import OwnFiles, run_folder
@@ -259,7 +259,7 @@ def finish(
     with files.writing("summary.json") as path:
         summary = summary_of(card) | asdict(smoothness) | guard_figures(companion)
         write_whole(path, (json.dumps(summary, indent=2) + "\n").encode())
-    console.print(_table(card, smoothness))
+    console.print(_table(card, smoothness, companion))
     is_good = track.is_whole and card.collision.value == 0.0 and (is_down or is_excused)
     return 0 if is_good and not files.missing else 1
 
@@ -271,10 +271,11 @@ def summary_of(card: Scorecard) -> dict[str, float | None]:
     return {name: value if isfinite(value) else None for name, value in figures.items()} | {"minutes": card.minutes}
 
 
-def _table(card: Scorecard, smoothness: Smoothness) -> Table:
+def _table(card: Scorecard, smoothness: Smoothness, companion: Companion) -> Table:
     table = Table("figure", "value", title="scorecard", title_justify="left")
     for row in lines(card):
         table.add_row(*row)
     table.add_row("own level acceleration, RMS", f"{smoothness.accel_rms:.2f} m/s²")
     table.add_row("own yaw rate, RMS", f"{smoothness.yaw_rate_rms:.1f} deg/s")
+    table.add_row(*guard_row(companion))
     return table

@@ -6,6 +6,7 @@ from typing import Any
 from policies.companion.companion import Companion
 
 DECISIONS_PER_MIN = 600.0  # ten a second
+SHOWN = 3  # reasons on the scorecard, the most frequent
 
 
 def guard_text(companion: Companion) -> str:
@@ -27,3 +28,12 @@ def guard_figures(companion: Companion) -> dict[str, Any]:
     changed = dict(interventions.most_common())
     per_min = {why: round(count * DECISIONS_PER_MIN / max(decisions, 1), 2) for why, count in changed.items()}
     return {"guard": {"decisions": decisions, "changed": changed, "changed_per_min": per_min}}
+
+
+def guard_row(companion: Companion) -> tuple[str, str]:
+    """A row of the scorecard: what a guard has changed per minute of decisions, the most frequent reasons."""
+    guard = guard_figures(companion)["guard"]
+    if guard is None:
+        return "changed by the guard", "no guard"
+    often = list(guard["changed_per_min"].items())[:SHOWN]
+    return "changed by the guard, per minute", ", ".join(f"{per_min:.0f} {why}" for why, per_min in often) or "none"
