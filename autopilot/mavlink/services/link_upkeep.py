@@ -1,4 +1,4 @@
-"""What keeps a link in touch: heartbeats of clients, pings, their clocks, the rates of the oldest stations; texts to log.
+"""What keeps a link in touch: heartbeats of clients, pings, their clocks, rates of the oldest stations; texts to log.
 
 Texts of the vehicle's other components belong into its log, as PX4 has them: what a companion did, and why.
 """

@@ -12,7 +12,8 @@ OVER_OWNER, OVER_SOMEBODY = "over the owner", "over somebody near"
 TOO_FAST, HEIGHT, TILTED = "too fast", "height", "tilted"
 NO_GNSS, OLD_TELEMETRY = "no GNSS", "old telemetry"
 REASONS = (
-    NEAR_SOMEBODY, NEAR_SOMETHING, NO_DEPTH, OVER_OWNER, OVER_SOMEBODY, TOO_FAST, HEIGHT, TILTED, NO_GNSS, OLD_TELEMETRY,
+    NEAR_SOMEBODY, NEAR_SOMETHING, NO_DEPTH, OVER_OWNER, OVER_SOMEBODY, TOO_FAST, HEIGHT, TILTED,
+    NO_GNSS, OLD_TELEMETRY,
 )  # fmt: skip
 """Those that are no stances. A log keeps their places: new ones go to the end."""
 BEGINS_US = 5_000_000  # a reason that was not there for so long begins

@@ -1,8 +1,8 @@
 """How much later than usual setpoints reach the vehicle, by how long it takes to answer.
 
-In: a TIMESYNC sent twice a second, and the vehicle's answers. Out: what the guard adds to its reaction. Autopilots answer
-at once, so that the round trip is the link's: what telemetry is late by counts as well, since no age on the vehicle's
-clock tells it. One that does not answer is taken to be no later than usual.
+In: a TIMESYNC sent twice a second, and the vehicle's answers. Out: what the guard adds to its reaction. Autopilots
+answer at once, so that the round trip is the link's: what telemetry is late by counts as well, since no age on the
+vehicle's clock tells it. One that does not answer is taken to be no later than usual.
 """
 
 from collections import deque

@@ -1,6 +1,7 @@
 """`honeyguide follow`: what it writes, and what it refuses."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,10 +9,12 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from mission.cli import app
+from mission.follow.guard_report import guard_row
 from mission.simulator.flight_rig import flight_world
 from mission.view.film import write_film
 from mission.view.film_images import HEIGHT, WIDTH
 from mission.view.replay_file import load_recording
+from policies.companion.guard.interventions import NEAR_SOMEBODY, NEAR_SOMETHING, NO_DEPTH, TILTED, Interventions
 from tests.unit.mission.view.rows import CONFIG, hovering
 
 
@@ -24,6 +27,7 @@ def test_it_follows_lands_and_writes_scorecard_and_recording(tmp_path):
     result = run("--speed", "max", "--seconds", "5", "--no-mp4", "--run-folder", str(folder))
     assert result.exit_code == 0, result.output
     assert "scorecard" in result.output
+    assert "changed by the guard, per minute" in result.output
     summary = json.loads((folder / "summary.json").read_text(), parse_constant=pytest.fail)  # no NaN: strict readers
     assert summary["in_band"] is not None
     guard = summary["guard"]
@@ -90,3 +94,22 @@ def test_wrong_arguments_are_refused_with_one_sentence(arguments, sentence, tmp_
     assert result.exit_code == 2
     assert sentence in result.stderr
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("changed", "row"),
+    [
+        (None, ("changed by the guard", "no guard")),
+        ({}, ("changed by the guard, per minute", "none")),
+        (
+            {TILTED: 3, NEAR_SOMETHING: 300, NEAR_SOMEBODY: 60, NO_DEPTH: 2},
+            ("changed by the guard, per minute", "150 near something, 30 near somebody, 2 tilted"),
+        ),
+    ],
+)
+def test_the_scorecard_has_what_the_guard_changed_most_per_minute_of_decisions(changed, row):
+    interventions = None if changed is None else Interventions()
+    if changed:
+        interventions.update(changed)
+    skill = SimpleNamespace(interventions=interventions)
+    assert guard_row(SimpleNamespace(skill=skill, decision_count=1200)) == row
