@@ -80,7 +80,9 @@ CONDITIONS = (
         0.9,
     ),
     Condition("red", "red clothes", "walk", {"owner_hue": 0.0}, 0.9),
-    Condition("clothes", "any clothes, 0.85 of the size", "walk", {"owner_clothes_fraction": 1.0, "owner_size": 0.85}, 0.9),
+    Condition(
+        "clothes", "any clothes, 0.85 of the size", "walk", {"owner_clothes_fraction": 1.0, "owner_size": 0.85}, 0.9
+    ),
     Condition(
         "crouch",
         "crouches wherever they stop, which is often",
