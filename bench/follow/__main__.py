@@ -124,7 +124,8 @@ def unpublished(results_folder: Path, pretrained: Path) -> list[str]:
     for stage, trained in _trained(results_folder):
         ships = pretrained / f"{stage.recipe}.pt"
         if not any(_is_same(path, ships) for path in trained):
-            lines.append(f"{', '.join(map(str, trained))}: not {ships.name}, which still ships: --publish")
+            how = "--publish" if len(trained) >= SEEDS else f"--publish asks for {SEEDS} seeds"
+            lines.append(f"{', '.join(map(str, trained))}: not {ships.name}, which still ships: {how}")
     return lines
 
 

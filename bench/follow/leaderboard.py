@@ -92,8 +92,10 @@ def main(
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise typer.BadParameter(f"{folder}/flights.json: not as the benchmark writes it: {error!r}") from error
         entries = [*(other for other in entries if other.name != name), entry]
+    page = with_entries(PAGE.read_text(encoding="utf-8"), entries)
+    if folder is not None:
         write_rows(entries)
-    write_whole(PAGE, with_entries(PAGE.read_text(encoding="utf-8"), entries).encode())
+    write_whole(PAGE, page.encode())
 
 
 if __name__ == "__main__":

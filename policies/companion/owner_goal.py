@@ -17,7 +17,7 @@ from policies.companion.guard.guard import GOES_ON_S, SHORT_OF_M
 from policies.companion.guard.limits import faded, stopping_speed
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
-from policies.companion.senses.image_fit import NO_IMAGES, OTHER_CLOCK, misfit
+from policies.companion.senses.image_fit import NO_IMAGES, OLD_IMAGES, OTHER_CLOCK, misfit
 from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
@@ -72,7 +72,8 @@ class OwnerGoal:
         if image is not None:
             self._vehicle.clock.pictured(image.time_us)
             self._wrong = misfit(image, IMAGE_SHAPE) or self._off_clock(image)
-        if self._taken_us is None or (image is not None and not self._wrong):
+        is_heard = self._vehicle.own.boot_us != NEVER_US  # else no clock to hold an image against
+        if self._taken_us is None or not is_heard or (image is not None and not self._wrong):
             self._taken_us, self._is_blind = time_us, False
         if not self._is_blind and time_us - self._taken_us > BLIND_US:
             self._is_blind = True
@@ -84,7 +85,7 @@ class OwnerGoal:
         ahead_us = image.time_us - self._vehicle.own.boot_us
         if abs(ahead_us) <= IMAGE_OLD_US:
             return ""
-        return OTHER_CLOCK if ahead_us > 0 else NO_IMAGES
+        return OTHER_CLOCK if ahead_us > 0 else OLD_IMAGES
 
     @property
     def _known_us(self) -> int:

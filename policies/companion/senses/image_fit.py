@@ -7,7 +7,7 @@ from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, TILT_DEG
 
 LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the images that policies are trained on
 OTHER_SIZE, OTHER_LENS = "pictures of another size", "pictures of another lens"
-NO_IMAGES, OTHER_CLOCK = "no new pictures", "pictures from the future"
+NO_IMAGES, OLD_IMAGES, OTHER_CLOCK = "no new pictures", "old pictures", "pictures from the future"
 _LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view
 
 

@@ -128,6 +128,7 @@ class Following:
 
     def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
         self._owner = vehicle.owner
+        self._delay.step(time_us)  # before anything that takes time
         image = self._taken(vehicle, time_us)
         if image is not None:
             self._image, self._image_us, self._is_new = image, time_us, True
@@ -139,7 +140,6 @@ class Following:
         if self._sight is not None and self.guard is not None:
             self._sight.step(vehicle.own, image, time_us)
             self.guard.vel_std = self._sight.std(vehicle.own)
-            self._delay.step(time_us)
             self.guard.reckon_with(self._delay.late_s)
         if self._recorder is not None:
             self._recorder.sense(vehicle.own, self._owner, image)

@@ -116,6 +116,7 @@ def see(w: World, truth: Truth, n: FollowParams, person: Person, drawn: Person) 
     if drawn.stature_m <= 0.0:
         return sight
     sight.lower_m = CHEST_M * (1.0 - drawn.stature_m / STATURE_M)
+    chest += wp.vec3(0.0, 0.0, sight.lower_m)
     is_chest_free = is_line_free(w, lens.pos_ned, chest)
     is_head_free = is_chest_free or is_line_free(w, lens.pos_ned, head)
     sight.is_free = int(is_chest_free or is_head_free)

@@ -118,7 +118,7 @@ def sight_drawn(
     """Where picture k shows the owner's chest."""
     state = draw_key(seed, i, k, _STREAM)
     fixed = draw_key(seed, i, 0, _EPISODE_STREAM)
-    p = sight.position_hfrd
+    p = sight.position_hfrd + wp.vec3(0.0, 0.0, sight.lower_m)
     level_m = wp.max(wp.sqrt(p[0] * p[0] + p[1] * p[1]), 1.0e-3)
     noise = n.camera_noise
     along = _ALONG_BIAS_M * wp.randn(fixed) + noise * (_ALONG_M + _ALONG_FRACTION * level_m) * wp.randn(state)
@@ -126,7 +126,7 @@ def sight_drawn(
     if has_depth == 0:
         along = level_m * (bias + noise * _COLOUR_FRACTION * wp.randn(state))
     aside = level_m * (_ACROSS_BIAS_RAD * wp.randn(fixed) + noise * _ACROSS_RAD * wp.randn(state))
-    down = sight.lower_m + _DOWN_BIAS_M * wp.randn(fixed) + _DOWN_M * wp.randn(state)
+    down = _DOWN_BIAS_M * wp.randn(fixed) + _DOWN_M * wp.randn(state)
     across = p[0] / level_m  # of what is aside in the image
     aside += p[1] * across * (1.0 / n.lens_scale - 1.0)  # where a lens shows them that is taken for the usual one
     down += level_m * wp.tan(n.lens_tilt_deg * _RADIANS)

@@ -205,7 +205,7 @@ def test_images_that_it_can_make_nothing_of_are_said_once_and_it_goes_by_the_pho
     ("pixels", "late_us", "hfov_deg", "wrong"),
     [
         (None, 0, HFOV_DEG, "no new pictures"),
-        (BLANK, 400_000, HFOV_DEG, "no new pictures"),
+        (BLANK, 400_000, HFOV_DEG, "old pictures"),
         (BLANK, -400_000, HFOV_DEG, "pictures from the future"),
         (BLANK, 0, 70.0, "pictures of another lens"),
     ],
