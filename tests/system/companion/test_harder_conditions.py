@@ -15,6 +15,7 @@ pytestmark = pytest.mark.slow
 
 SEED = 2_000_007  # whoever hides does so after 5.5 s
 SECONDS = 30.0
+SHORT = 0.25  # so much less of half a minute than is wanted of sixty whole ones: where it starts counts more
 
 
 def flown(name: str) -> Outcome:
@@ -27,7 +28,8 @@ def flown(name: str) -> Outcome:
 @pytest.mark.parametrize("name", [each.name for each in CONDITIONS if each.least_in_band is not None])
 def test_nobody_is_touched_and_the_owner_is_followed_to_the_end(name: str) -> None:
     outcome = flown(name)
-    assert outcome.in_band > 0.5, outcome  # it follows at all; how well is the benchmark's question
+    assert outcome.in_band > BY_NAME[name].least_in_band - SHORT, outcome
+    assert outcome.is_kept, outcome
 
 
 @pytest.mark.parametrize("name", [each.name for each in CONDITIONS if each.least_m is not None])
@@ -35,4 +37,5 @@ def test_it_stands_soon_after_the_last_sight_of_an_owner(name: str) -> None:
     outcome = flown(name)
     if BY_NAME[name].numbers["owner_hide_s"] > HOLD_S:
         assert outcome.has_stood, f"not {HOLD_S:g} s after it: {outcome}"
-    assert outcome.nearest_hidden_m > 1.0, outcome
+    assert outcome.nearest_hidden_m >= BY_NAME[name].least_m, outcome
+    assert outcome.has_resumed is not False, outcome  # None: nobody came back in time
