@@ -33,6 +33,7 @@ _CHEST_M = (0.3, 0.3, 0.4)  # aside, up and down of its middle: nearly all of th
 _COLOURS_WITHIN_M = 6.0  # farther off, too few pixels are of nothing else
 _DARK = 0.2  # of the image's brightness: darker than this, a colour is noise
 WEIGHTS = Path(__file__).parent / "weights.pt"
+LOW_WEIGHTS = Path(__file__).parent / "weights-low.pt"  # of cameras near the ground: rovers'
 _HALF_WIDTH = np.tan(np.radians(0.5 * HFOV_DEG))
 
 
@@ -213,8 +214,8 @@ def _chest_colours(pixels: NDArray[np.uint8], at: tuple[float, float], range_m: 
     return np.array([red - green, blue - green, (red + green + blue) / 3.0])
 
 
-def shipped() -> DetectorNetwork:
-    """The network that ships."""
+def shipped(weights: Path = WEIGHTS) -> DetectorNetwork:
+    """A network that ships."""
     network = DetectorNetwork()
-    load_weights(network, WEIGHTS)
+    load_weights(network, weights)
     return network

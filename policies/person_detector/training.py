@@ -18,23 +18,23 @@ from torch import Tensor
 from torch.nn import functional
 
 from common.intervals import rate
-from policies.companion.senses.low_detector import LowDetector
 from policies.image_layers import save_weights
-from policies.person_detector.detector import SURE, WEIGHTS, DetectorNetwork, PersonDetector, shipped
+from policies.person_detector.detector import LOW_WEIGHTS, SURE, WEIGHTS, DetectorNetwork, PersonDetector, shipped
 from policies.person_detector.scenes import HEIGHTS_M, Scenes, scenes
 
 BATCH = 128
 RATE = 2e-3
 _FOCUS = 2.0
 _RANGE_WEIGHT = 0.1
-_LOW_M = (0.25, 0.5)  # lenses on a rover
+_LOW_M = (0.25, 0.6)  # lenses on a rover
+Heights = tuple[float, float]  # of lenses above the ground [m]
 
 
-def train(images: int, epochs: int, seed: int, console: Console) -> DetectorNetwork:
+def train(images: int, epochs: int, seed: int, console: Console, heights_m: Heights = HEIGHTS_M) -> DetectorNetwork:
     """A network trained on so many images, calibrated on others."""
     torch.manual_seed(seed)
     console.print(f"rendering {images} images")
-    there = scenes(images, seed)
+    there = scenes(images, seed, heights_m=heights_m)
     network = DetectorNetwork()
     optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=1e-4)
     steps = epochs * (len(there.images) // BATCH)
@@ -47,7 +47,7 @@ def train(images: int, epochs: int, seed: int, console: Console) -> DetectorNetw
         loss.backward()  # type: ignore[no-untyped-call]
         optimizer.step()
         schedule.step()
-    _calibrate(network.eval(), scenes(max(images // 10, 640), seed + 1000))
+    _calibrate(network.eval(), scenes(max(images // 10, 640), seed + 1000, heights_m=heights_m))
     return network
 
 
@@ -92,9 +92,9 @@ def _best_logits(network: DetectorNetwork, there: Scenes) -> NDArray[np.float64]
     return torch.cat(parts).double().numpy()
 
 
-def judge(network: DetectorNetwork, there: Scenes, kind: type[PersonDetector] = PersonDetector) -> dict[str, Any]:
+def judge(network: DetectorNetwork, there: Scenes) -> dict[str, Any]:
     """How often it sees who is there, and somebody where nobody is, as it flies; how true its probabilities are."""
-    detector, counts = kind(network), there.has_person | there.is_empty
+    detector, counts = PersonDetector(network), there.has_person | there.is_empty
     seen, ghosts = (rate(is_sure(detector, there.images[rows])) for rows in (there.has_person, there.is_empty))
     probability = 1.0 / (1.0 + np.exp(-_best_logits(network, there)))
     bins = np.digitize(probability[counts], np.linspace(0.1, 0.9, 9))
@@ -130,18 +130,18 @@ def main(
     images: Annotated[int, typer.Option(min=640)] = 24_000,
     epochs: Annotated[int, typer.Option(min=1)] = 14,
     seed: int = 1,
-    out: Path = WEIGHTS,
+    out: Annotated[
+        Path | None, typer.Option(help="Where the weights go; default: in the place of those that ship.")
+    ] = None,
     judged: Annotated[bool, typer.Option("--judge", help="Train nothing: judge the one that ships.")] = False,
-    low: Annotated[
-        bool, typer.Option("--low", help="Judge it as on a rover: near the ground, helped by blue shirts.")
-    ] = False,
+    low: Annotated[bool, typer.Option("--low", help="That of rovers: for lenses near the ground.")] = False,
 ) -> None:
     console = Console(highlight=False)
-    network = shipped().eval() if judged else train(images, epochs, seed, console)
+    heights_m, ships = (_LOW_M, LOW_WEIGHTS) if low else (HEIGHTS_M, WEIGHTS)
+    network = shipped(ships).eval() if judged else train(images, epochs, seed, console, heights_m)
     if not judged:
-        save_weights(network, out)
-    there = scenes(6400, 7, is_test=True, heights_m=_LOW_M if low else HEIGHTS_M)
-    found = judge(network, there, LowDetector if low else PersonDetector)
+        save_weights(network, out or ships)
+    found = judge(network, scenes(6400, 7, is_test=True, heights_m=heights_m))
     for name, value in found.items():
         console.print(f"{name}: {value}")
 

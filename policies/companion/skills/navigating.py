@@ -24,12 +24,12 @@ from policies.companion.image_client import ImageSource
 from policies.companion.observation import CommandKernel, write_own_row
 from policies.companion.owner_goal import OwnerGoal
 from policies.companion.ranges import Ranges
-from policies.companion.senses.low_detector import LowDetector
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.goal_skill import GoalSkill
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.vector_pilot import NavigationPilot
 from policies.companion.vehicle_link import Own, VehicleLink
+from policies.person_detector.detector import LOW_WEIGHTS, WEIGHTS, PersonDetector, shipped
 from policies.tasks.flight.own_state import OwnState
 from policies.tasks.navigate.observe import observe_rows
 
@@ -76,11 +76,13 @@ class Navigating(GoalSkill):
         self.goals = (
             Goals(vehicle, is_ordered_by_goto=self._is_ordered_by_goto)
             if self.camera is None
-            else OwnerGoal(
-                vehicle, self.camera, Senses(detector=LowDetector() if self.drives else None), self._settings
-            )
+            else OwnerGoal(vehicle, self.camera, Senses(detector=self._detector()), self._settings)
         )
         self.ranges = Ranges(vehicle)
+
+    def _detector(self) -> PersonDetector:
+        """Of people, as the camera is high."""
+        return PersonDetector(shipped(LOW_WEIGHTS if self.drives else WEIGHTS))
 
     def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:
         if isinstance(self.goals, OwnerGoal):

@@ -1,4 +1,4 @@
-"""The detector that ships, as it flies, on worlds that no training has: figures of docs/how-to/follow-me.md hold."""
+"""The detectors that ship, as they fly and drive, on worlds that no training has: figures of the documentation hold."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from common.image_stream import ImageFrame
 from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import Own, Owner
-from policies.person_detector.detector import STRIDE, SURE, Detection, PersonDetector
+from policies.person_detector.detector import LOW_WEIGHTS, STRIDE, SURE, Detection, PersonDetector, shipped
 from policies.person_detector.scenes import scenes
 from policies.person_detector.training import is_sure
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, TILT_DEG
@@ -34,6 +34,13 @@ def test_it_sees_who_is_there(judged):
     seen, _ = judged
     assert len(seen) > 400
     assert seen.mean() > 0.88  # 92.2 % of 3,700
+
+
+def test_that_of_rovers_sees_who_is_there_and_nobody_else_from_near_the_ground():
+    there, detector = scenes(1024, 11, is_test=True, heights_m=(0.25, 0.6)), PersonDetector(shipped(LOW_WEIGHTS))
+    seen, ghosts = (is_sure(detector, there.images[rows]) for rows in (there.has_person, there.is_empty))
+    assert ghosts.mean() < 0.03  # 1.3 % of 1,900
+    assert seen.mean() > 0.87  # 90.7 % of 3,800
 
 
 def test_its_ranges_by_depth_hold_in_the_middle_of_an_image_and_at_its_edge(there):
