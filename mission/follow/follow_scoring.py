@@ -20,10 +20,10 @@ from policies.companion.engagement import Engagement
 from policies.tasks.follow_me.measuring import COLUMNS, measure_rows
 from policies.tasks.follow_me.observe import DECISION_S, HFOV_DEG, IMAGE_SIZE
 from policies.tasks.follow_me.track import Ranges, Track
+from sim.world.people import STATURE_M
 
-STATURE_M = 1.75
 PIXELS_LEAST = 2
-VISIBLE_M = STATURE_M * IMAGE_SIZE / (PIXELS_LEAST * 2.0 * tan(radians(0.5 * HFOV_DEG)))
+VISIBLE_M = float(STATURE_M) * IMAGE_SIZE / (PIXELS_LEAST * 2.0 * tan(radians(0.5 * HFOV_DEG)))
 """Farther away a person is less than two pixels high: a policy cannot tell them from a trunk (guess)."""
 _SAMPLE_US = round(DECISION_S * 1e6)
 _BEFORE = (Mode.TAKEOFF, Mode.HOLD)  # on the way to being followed

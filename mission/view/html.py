@@ -24,6 +24,7 @@ from mission.view.replay_file import Recording
 from mission.view.snapshot_images import onboard_eye
 from mission.view.vehicle_model import turned_rad
 from mission.view.web.page_arrays import Json, array_data, mesh_data
+from sim.world.people import STATURE_M
 from sim.world.world import WorldMap
 
 STRIDE = 5  # frames of the flight per moment of the page: 10 a second
@@ -32,7 +33,6 @@ TILES_PER_S = 5
 TILE_COLUMNS = 20
 CELLS_MOST = 128
 JPEG_QUALITY = 80
-STATURE_M = 1.75
 
 
 def write_html(recording: Recording, world: WorldMap, target: Path, title: str) -> None:
@@ -71,7 +71,7 @@ def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
         "wheel_hubs": array_data(shape.wheel_hubs),
         "is_steered": list(shape.is_steered),
         "away_m": 3.0 if shape.drives else 7.0,
-        "person": mesh_data(shapes.person(STATURE_M)),
+        "person": mesh_data(shapes.person(float(STATURE_M))),
         "hubs": array_data(shape.hubs),
         "spins": list(shape.spins),
         "path_ned": array_data(recording.path_ned) if len(recording.path_ned) > 1 else None,

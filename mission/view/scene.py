@@ -20,10 +20,10 @@ from mission.view.flight_snapshot import Moment
 from mission.view.pose_goals import Pose
 from mission.view.vehicle_nodes import TRAIL_M, Trail, VehicleNodes, add_mesh, segments, wxyz_of
 from mission.world.world_shapes import part_mesh
+from sim.world.people import STATURE_M
 from sim.world.world import WorldMap
 
 VEHICLE_RGB, OWNER_RGB, GOAL_RGB, PLAN_RGB = (40, 110, 220), (232, 120, 32), (220, 40, 90), (250, 250, 250)
-STATURE_M = 1.75
 ARRIVED_M = 1.0  # a goal nearer than this is not shown: it would hide the vehicle
 PLAN_M = 0.25  # how thick it is: it is seen on both sides of the trail that covers it
 OTHERS_RGB = ((30, 150, 140), (150, 80, 190), (190, 140, 30), (110, 120, 130), (200, 80, 130), (90, 150, 50))
@@ -86,7 +86,7 @@ class Scene:
             for k, other in enumerate(others, 2)
         ]
         self._owner = self._api.add_frame("/owner", show_axes=False, visible=False)
-        add_mesh(self._api, "/owner/body", shapes.person(STATURE_M))
+        add_mesh(self._api, "/owner/body", shapes.person(float(STATURE_M)))
         self._goal = self._api.add_icosphere("/goal", radius=0.35, color=GOAL_RGB, opacity=0.7, visible=False)
         self.frustum = None if mount is None else self._frustum(mount)
         self._owner_trail = Trail(self._api, "/trails/owner", OWNER_RGB)

@@ -15,7 +15,7 @@ from common.image_stream import ImageFrame
 from policies.companion.goals import Goal
 from policies.companion.guard.guard import GOES_ON_S, SHORT_OF_M
 from policies.companion.guard.limits import faded, stopping_speed
-from policies.companion.guard.settings import GuardSettings
+from policies.companion.guard.settings import IMAGES_S, GuardSettings
 from policies.companion.image_client import ImageSource
 from policies.companion.senses.image_fit import NO_IMAGES, OLD_IMAGES, OTHER_CLOCK, misfit
 from policies.companion.senses.seen_owner import PersonNow
@@ -27,7 +27,9 @@ from policies.tasks.navigate.walking_goal import CLOSING_HZ
 KEPT_M = 1.5  # on the level, from an owner whose place is known
 DEVIATIONS = 2.0  # that it keeps away farther, of the error of their place
 IMAGE_OLD_US = 300_000  # guess: three images missed; then it goes by the phone alone
-BLIND_US = 2_500_000  # after so long without an image to go by it says so; as long as who follows by images waits
+BLIND_US = round(
+    IMAGES_S * 1e6
+)  # after so long without an image to go by it says so; as long as who follows by images waits
 LOST = "owner lost"
 _BRAKE_M_S2 = 1.0  # before where they are looked for
 
