@@ -75,7 +75,7 @@ class Rollouts:
             people: who are kept off besides; the wanted velocity does so, as far as it can be.
         """
         s = self._s
-        clearance = around.clearance(own.pos_ned, own.boot_us)
+        clearance = around.clearance(own.pos_ned, own.boot_us).with_room_seen()  # its hull passes beside its middle
         here_m = float(clearance.at(np.array(own.pos_ned[:2]))[0])
         wants = self._judged(wanted[None], last, own, clearance, here_m, people)
         if wants.is_clear[0] and wants.is_allowed[0] and wants.least_m[0] >= s.solid_m + _SLACK_M:

@@ -4,7 +4,7 @@ In: depth pictures or sectors of ranges, with the pose each was taken at. Out: h
 What has not been seen is not free.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, inf
 
 import cv2
@@ -37,6 +37,7 @@ _HULL_M = 0.35  # and where the vehicle itself is, nothing else is
 _FAN = 240  # directions all round in which a picture shows what is free: about a column each
 _FAN_RAD = 2.0 * np.pi / _FAN
 _FAN_UNITS = np.stack([np.cos((np.arange(_FAN) + 0.5) * _FAN_RAD), np.sin((np.arange(_FAN) + 0.5) * _FAN_RAD)], -1)
+_BESIDE = np.ones((3, 3), np.uint8)  # a cell and those next to it
 _RAYS = 5  # of a sector of ranges: a cell apart at the edge of what is asked for
 
 Floats = NDArray[np.float64]
@@ -52,6 +53,11 @@ class Clearance:
     """Was seen to be free not long ago."""
     corner: tuple[int, int]
     """Of the first cell, in cells from the origin."""
+
+    def with_room_seen(self) -> "Clearance":
+        """The same for who is wider than a cell: seen is what is so with the cells next to it."""
+        is_seen = cv2.erode(self.is_seen.astype(np.uint8), _BESIDE, borderValue=0) > 0
+        return replace(self, is_seen=is_seen)
 
     def at(self, points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """How near the nearest solid cell is [m], between cells too, and whether the cell of a place is seen.

@@ -48,6 +48,17 @@ def test_where_nothing_has_been_seen_it_creeps() -> None:
     assert 0.3 < float(np.hypot(*kept)) <= S.unseen_speed + 1e-6
 
 
+def test_who_flies_along_the_edge_of_what_it_has_seen_keeps_its_hull_within_it() -> None:
+    """A trunk just beyond the edge would be met by what is beside its middle."""
+    wanted, pos, still = np.array([3.0, 0.0]), np.array([0.0, 0.2]), np.zeros(2)
+    east = BEARINGS < np.pi
+    seen = LocalMap()
+    seen.sweep(BEARINGS[east], SECTOR_RAD, np.full(180, 12.0)[east], 12.0, Pose(0, (*pos, -1.6), LEVEL), 0)
+    kept = Rollouts(S).clear_velocity(wanted, still, own_at(pos, still), seen)
+    assert float(kept[1]) > 0.0
+    assert float(kept[0]) > 0.5 * float(wanted[0])  # away from the edge it goes on
+
+
 def test_who_is_pressed_goes_back_to_where_it_has_not_looked() -> None:
     back, still = np.array([-2.0, 0.0]), np.zeros(2)
     pressing = [Somebody(np.array([1.0, 0.0]), -2.0, 1.0, 0.0)]
