@@ -71,7 +71,7 @@ class GoalGuard:
         update = {"brake": brake, "solid_m": settings.goal_solid_m}
         update |= dict.fromkeys(("reaction_s", "hears_s"), settings.goal_reaction_s)
         self.settings = settings.model_copy(update=update)
-        self._rollouts = Rollouts(self.settings)
+        self._rollouts = Rollouts(self.settings, sees_all_round=True)
         self._drives = drives
         self.stance = GoalStance.FREE
         self.interventions = Interventions()

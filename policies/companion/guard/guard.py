@@ -69,7 +69,7 @@ class Guard:
     def __init__(self, settings: GuardSettings, senses: Senses) -> None:
         self.settings = self._usual = settings
         self.senses = senses
-        self._people, self._rollouts = PeopleRule(settings), Rollouts(settings)
+        self._people, self._rollouts = PeopleRule(settings), Rollouts(settings, sees_all_round=False)
         self.stance = Stance.FREE
         self.interventions = Interventions()
         self._late_s = 0.0  # that setpoints are later than usual
@@ -101,7 +101,8 @@ class Guard:
         self._late_s, usual = late_s, self._usual
         later = {"reaction_s": usual.reaction_s + late_s, "hears_s": usual.hears_s + late_s}
         self.settings = usual.model_copy(update=later)
-        self._people, self._rollouts = PeopleRule(self.settings), Rollouts(self.settings)
+        self._people = PeopleRule(self.settings)
+        self._rollouts = Rollouts(self.settings, sees_all_round=False)
 
     def is_lost(self, own: Own) -> bool:
         """Whether the owner was not seen for so long that it is the end; who has just begun may look for them first."""
