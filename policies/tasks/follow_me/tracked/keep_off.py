@@ -134,8 +134,8 @@ def sinking_max(k: KeepOff, over_m: float, then_m: float, closing: float, coming
     That is who is within the way by which they come nearer until it goes as fast as they do, braking as it is taken to;
     or, since trees may end its way back, within what they go in a third of a second.
 
-    So far above their chest [m], without what it has lost by then, and so near [m] by when it answers; they come nearer
-    to each other, and come at it [m/s]; seen so long ago [s].
+    So far above their chest [m], and so near [m], both by when it answers; they come nearer to each other, and come at
+    it [m/s]; seen so long ago [s].
     """
     nearing, coming = wp.max(closing, 0.0), wp.max(coming, 0.0)
     if then_m < k.owner_m + wp.max(0.5 * nearing * nearing / k.brake, _CLIMBS_S * coming):
@@ -161,12 +161,13 @@ def bounds(
     """All of the rule, of who was seen so long ago; as `closing_max` is asked, with a velocity in ned."""
     b = Bounds()
     level = wp.vec2(own_vel[0], own_vel[1])
-    over_then_m = over_m - k.reaction_s * wp.max(own_vel[2], 0.0)  # height that it loses is none to go by
+    lost_m = k.reaction_s * own_vel[2]
+    over_then_m = over_m - wp.max(lost_m, 0.0)  # height that it loses is none to keep off by; none that it gains, yet,
     b.closing_max = closing_max(k, way, level, other_vel, vel_std, age_s, over_then_m)
     b.then_m = distance_then(way, level, other_vel, k.reaction_s, age_s)
     unit = unit_of(way)
     closing, coming = wp.dot(level - other_vel, unit), -wp.dot(other_vel, unit)
-    b.sinking_max = sinking_max(k, over_then_m, b.then_m, closing, coming, age_s)
+    b.sinking_max = sinking_max(k, over_m - lost_m, b.then_m, closing, coming, age_s)  # but to climb no farther
     return b
 
 

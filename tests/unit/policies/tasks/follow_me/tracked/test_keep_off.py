@@ -157,9 +157,20 @@ def test_who_comes_is_climbed_over_in_time_even_if_it_goes_back_as_fast_as_they_
     assert sinks(1.6, (0.0, 0.0, 0.0), 2.0) > 1.0  # they go
 
 
-def test_height_that_it_is_losing_is_none_to_go_by() -> None:
-    assert sinks(1.0, (0.0, 0.0, 1.0), 0.0, over_m=1.3) == pytest.approx(2.0 * (1.3 - REACTION_S - 1.45))
-    assert sinks(1.0, (0.0, 0.0, -1.0), 0.0, over_m=1.3) == pytest.approx(2.0 * (1.3 - 1.45))
+def test_what_it_climbs_over_somebody_is_by_the_height_that_it_has_when_it_answers() -> None:
+    """It would climb on into crowns otherwise."""
+    for down in (1.0, 0.0, -1.0):
+        over_m = 1.3 - REACTION_S * down
+        assert sinks(1.0, (0.0, 0.0, down), 0.0, over_m=1.3) == pytest.approx(2.0 * (over_m - 1.45), abs=1e-6)
+
+
+def test_height_that_it_is_losing_is_none_to_keep_off_by_and_none_that_it_gains_yet() -> None:
+    def keeps(down: float) -> float:
+        vel = wp.vec3(0.0, 0.0, down)
+        return float(bounds(RULE, wp.vec2(1.2, 0.0), vel, wp.vec2(0.0, 0.0), 0.0, 0.1, 1.2).closing_max)
+
+    assert keeps(1.0) < keeps(0.0)
+    assert keeps(-1.0) == keeps(0.0)
 
 
 def test_with_late_pictures_it_stays_over_the_chest_of_who_is_near_from_where_it_is_soon_over_their_head() -> None:
