@@ -69,7 +69,7 @@ class Guard:
     def __init__(self, settings: GuardSettings, senses: Senses) -> None:
         self.settings = self._usual = settings
         self.senses = senses
-        self._people, self._rollouts = PeopleRule(settings), Rollouts(settings, sees_all_round=False)
+        self._people, self._rollouts = PeopleRule(settings), Rollouts(settings, asks_beside=True)
         self.stance = Stance.FREE
         self.interventions = Interventions()
         self._late_s = 0.0  # that setpoints are later than usual
@@ -102,7 +102,7 @@ class Guard:
         later = {"reaction_s": usual.reaction_s + late_s, "hears_s": usual.hears_s + late_s}
         self.settings = usual.model_copy(update=later)
         self._people = PeopleRule(self.settings)
-        self._rollouts = Rollouts(self.settings, sees_all_round=False)
+        self._rollouts = Rollouts(self.settings, asks_beside=True)
 
     def is_lost(self, own: Own) -> bool:
         """Whether the owner was not seen for so long that it is the end; who has just begun may look for them first."""

@@ -49,13 +49,13 @@ class Rollouts:
 
     Args:
         s: of the guard.
-        sees_all_round: what is beside its way is seen from there. Otherwise a way counts as seen if what is next to
-            it is, too: the hull is wider than the way of its middle, and a camera looks ahead.
+        asks_beside: a way counts as seen only if what is next to it is, too: the hull is wider than the way of its
+            middle, and a camera looks ahead.
     """
 
-    def __init__(self, s: GuardSettings, *, sees_all_round: bool) -> None:
+    def __init__(self, s: GuardSettings, *, asks_beside: bool) -> None:
         start_warp()
-        self._s, self._sees_all_round = s, sees_all_round
+        self._s, self._asks_beside = s, asks_beside
         asked, now = wp.zeros(_MOST, dtype=wp.vec2), wp.zeros(2, dtype=wp.vec2)
         way = wp.zeros((_MOST, _STEPS + 1), dtype=wp.vec2)
         self._asked, self._now, self._way = asked.numpy(), now.numpy(), way.numpy()  # live views
@@ -78,8 +78,8 @@ class Rollouts:
         """
         s = self._s
         clearance = around.clearance(own.pos_ned, own.boot_us)
-        if not self._sees_all_round:
-            clearance = clearance.with_room_seen()
+        if self._asks_beside:
+            clearance = clearance.with_room_seen(np.array(own.pos_ned[:2]))
         here_m = float(clearance.at(np.array(own.pos_ned[:2]))[0])
         wants = self._judged(wanted[None], last, own, clearance, here_m, people)
         if wants.is_clear[0] and wants.is_allowed[0] and wants.least_m[0] >= s.solid_m + _SLACK_M:

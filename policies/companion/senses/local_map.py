@@ -54,10 +54,16 @@ class Clearance:
     corner: tuple[int, int]
     """Of the first cell, in cells from the origin."""
 
-    def with_room_seen(self) -> "Clearance":
-        """The same for who is wider than a cell: seen is what is so with the cells next to it."""
-        is_seen = cv2.erode(self.is_seen.astype(np.uint8), _BESIDE, borderValue=0) > 0
-        return replace(self, is_seen=is_seen)
+    def with_room_seen(self, here: Floats) -> "Clearance":
+        """The same for who is wider than a cell: seen is what is so with the cells next to it, or near where it is.
+
+        Args:
+            here: where it is [m], north and east; where it is already, nothing is to be asked.
+        """
+        is_wide = cv2.erode(self.is_seen.astype(np.uint8), _BESIDE, borderValue=0) > 0
+        north, east = (np.arange(CELLS) + 0.5 - line for line in here / CELL_M - self.corner)
+        is_near = np.hypot(north[:, None], east) * CELL_M <= _OWN_M
+        return replace(self, is_seen=self.is_seen & (is_wide | is_near))
 
     def at(self, points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """How near the nearest solid cell is [m], between cells too, and whether the cell of a place is seen.
@@ -231,15 +237,15 @@ class LocalMap:
         self._free_us[rows[~is_solid], columns[~is_solid]] = now_us
 
     def sight(self, pose: Pose, there_ned: Floats, now_us: int) -> None:
-        """Notes as free what lies between the vehicle at a pose and what it saw at a place."""
+        """Notes as free what lies between the vehicle at a pose and what it saw at a place, wide enough for a hull."""
         self._follow(pose.pos_ned)
         here = np.array(pose.pos_ned[:2])
         way = np.array(there_ned[:2]) - here
         far_m = float(np.hypot(*way))
         unit = way / max(far_m, 1e-3)
         aside = np.array([-unit[1], unit[0]]) * CELL_M
-        for start in (here - aside, here, here + aside):
-            self._open(start, unit[None], np.array([far_m]), now_us)
+        for cells in np.arange(-2.0, 2.5, 0.5):  # so fine that none is passed over, whatever way it leads
+            self._open(here + cells * aside, unit[None], np.array([far_m]), now_us)
 
     def clearance(self, pos_ned: Vector, now_us: int) -> Clearance:
         """What is known of places round a vehicle by now."""

@@ -38,7 +38,7 @@ def own_at(pos: np.ndarray, vel: np.ndarray) -> Own:
 
 def test_what_is_clear_is_flown_as_wanted() -> None:
     wanted = np.array([3.0, -2.0])
-    kept = Rollouts(S, sees_all_round=False).clear_velocity(
+    kept = Rollouts(S, asks_beside=True).clear_velocity(
         wanted, wanted, own_at(np.zeros(2), wanted), around(None, np.zeros(2))
     )
     assert kept == pytest.approx(wanted)
@@ -46,36 +46,43 @@ def test_what_is_clear_is_flown_as_wanted() -> None:
 
 def test_where_nothing_has_been_seen_it_creeps() -> None:
     still = np.zeros(2)
-    kept = Rollouts(S, sees_all_round=False).clear_velocity(
-        np.array([3.0, 0.0]), still, own_at(still, still), LocalMap()
-    )
+    kept = Rollouts(S, asks_beside=True).clear_velocity(np.array([3.0, 0.0]), still, own_at(still, still), LocalMap())
     assert 0.3 < float(np.hypot(*kept)) <= S.unseen_speed + 1e-6
 
 
-def test_who_flies_along_the_edge_of_what_it_has_seen_keeps_its_hull_within_it() -> None:
+@pytest.mark.parametrize("asks_beside", [True, False])
+def test_who_flies_along_the_edge_of_what_it_has_seen_keeps_its_hull_within_it_if_asked(asks_beside: bool) -> None:
     """A trunk just beyond the edge would be met by what is beside its middle."""
     wanted, pos, still = np.array([3.0, 0.0]), np.array([0.0, 0.2]), np.zeros(2)
     east = np.pi > BEARINGS
     seen = LocalMap()
     seen.sweep(BEARINGS[east], SECTOR_RAD, np.full(180, 12.0)[east], 12.0, Pose(0, (*pos, -1.6), LEVEL), 0)
-    kept = Rollouts(S, sees_all_round=False).clear_velocity(wanted, still, own_at(pos, still), seen)
+    kept = Rollouts(S, asks_beside=asks_beside).clear_velocity(wanted, still, own_at(pos, still), seen)
+    if not asks_beside:
+        assert kept == pytest.approx(wanted)
+        return
     assert float(kept[1]) > 0.0
     assert float(kept[0]) > 0.5 * float(wanted[0])  # away from the edge it goes on
+
+
+def test_who_flies_past_a_trunk_that_it_knows_goes_on_away_from_it() -> None:
+    """What is near where it is already, and unseen behind the trunk, is no reason to stand."""
+    pos, wanted = np.zeros(2), np.array([0.0, 3.0])
+    kept = Rollouts(S, asks_beside=True).clear_velocity(wanted, wanted, own_at(pos, wanted), around((0.0, -0.75), pos))
+    assert float(kept[1]) > 2.0
 
 
 def test_who_is_pressed_goes_back_to_where_it_has_not_looked() -> None:
     back, still = np.array([-2.0, 0.0]), np.zeros(2)
     pressing = [Somebody(np.array([1.0, 0.0]), -2.0, 1.0, 0.0)]
-    kept = Rollouts(S, sees_all_round=False).clear_velocity(back, still, own_at(still, still), LocalMap(), pressing)
+    kept = Rollouts(S, asks_beside=True).clear_velocity(back, still, own_at(still, still), LocalMap(), pressing)
     assert kept == pytest.approx(back)
 
 
 def test_who_can_go_round_a_trunk_does_so_at_speed() -> None:
     """Slower and slower towards it, it would be left behind by whom it follows."""
     wanted, pos = np.array([4.0, 0.0]), np.zeros(2)
-    kept = Rollouts(S, sees_all_round=False).clear_velocity(
-        wanted, wanted, own_at(pos, wanted), around((4.4, 0.1), pos)
-    )
+    kept = Rollouts(S, asks_beside=True).clear_velocity(wanted, wanted, own_at(pos, wanted), around((4.4, 0.1), pos))
     assert abs(float(kept[1])) > 0.5
     assert float(np.hypot(*kept)) == pytest.approx(4.0, abs=0.01)
 
@@ -90,7 +97,7 @@ def test_who_flies_at_a_trunk_goes_round_it_or_stands_and_never_nearer_to_somebo
         np.array([np.cos(angle), np.sin(angle)]), max(closing_max, speed * float(np.cos(angle))), 9.0, 0.0
     )
     wanted, pos, vel = np.array([speed, 0.0]), np.zeros(2), np.zeros(2)
-    rollouts, asked, lag_s = Rollouts(S, sees_all_round=False), [np.zeros(2)], S.reaction_s - step_s
+    rollouts, asked, lag_s = Rollouts(S, asks_beside=True), [np.zeros(2)], S.reaction_s - step_s
     for _ in range(60):
         asked.append(rollouts.clear_velocity(wanted, asked[-1], own_at(pos, vel), around(trunk, pos), [person]))
         assert float(asked[-1] @ person.way) <= person.closing_max + 1e-5

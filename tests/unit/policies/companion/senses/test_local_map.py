@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from common.attitude import Vector
-from policies.companion.senses.local_map import CELL_M, LocalMap
+from policies.companion.senses.local_map import CELL_M, CELLS, ROOM_M, Clearance, LocalMap
 from policies.companion.senses.poses import Pose
 from policies.mono_depth.network import SeenDepth
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, IMAGE_SIZE
@@ -86,6 +86,33 @@ def test_without_returns_there_is_no_depth_and_only_the_line_to_whom_it_sees_is_
     seen.sight(POSE, np.add(HERE, (4.0, 0.0, 0.0)), 0)
     assert way_m(seen, HERE, NORTH)[0] == pytest.approx(4.0, abs=2 * CELL_M)
     assert way_m(seen, HERE, SOUTH)[0] <= 1.0
+
+
+@pytest.mark.parametrize("bearing_deg", [0.0, 10.0, 30.0, 45.0, 120.0])
+def test_the_line_to_whom_it_sees_is_wide_enough_for_a_hull_whatever_way_it_leads(bearing_deg: float) -> None:
+    seen, way = LocalMap(), np.array([np.cos(np.radians(bearing_deg)), np.sin(np.radians(bearing_deg))])
+    seen.sight(POSE, np.add(HERE, (*(4.0 * way), 0.0)), 0)
+    along_m = np.arange(0.0, 3.4, 0.05)[:, None]
+    here = np.array(HERE[:2])
+    assert seen.clearance(HERE, 0).with_room_seen(here).at(here + along_m * way)[1].all()
+
+
+def test_for_who_is_wider_than_a_cell_only_what_has_seen_cells_all_round_is_seen_but_where_it_is() -> None:
+    is_seen = np.zeros((CELLS, CELLS), bool)
+    is_seen[40:60, 40:60] = True
+    is_seen[45, 45] = False  # a hole
+    near_m = np.full((CELLS, CELLS), ROOM_M, np.float32)
+    here = np.array([50.5, 59.5]) * CELL_M  # its own cell lies at the edge
+    wide = Clearance(near_m, is_seen, (0, 0)).with_room_seen(here)
+    assert not wide.is_seen[44:47, 44:47].any()
+    assert wide.is_seen[41:44, 41:59].all()
+    assert not wide.is_seen[40, 41:52].any()
+    assert wide.is_seen[50, 57:60].all()
+    assert not (wide.is_seen & ~is_seen).any()
+    assert wide.near_m is near_m
+    all_seen = Clearance(near_m, np.ones((CELLS, CELLS), bool), (0, 0)).with_room_seen(here)
+    assert all_seen.is_seen[1:-1, 1:-1].all()
+    assert not all_seen.is_seen[0, :40].any()  # beyond the map nothing is seen
 
 
 def test_what_was_seen_is_remembered_on_the_way_and_forgotten_in_time() -> None:
