@@ -69,7 +69,7 @@ class Guard:
     def __init__(self, settings: GuardSettings, senses: Senses) -> None:
         self.settings = self._usual = settings
         self.senses = senses
-        self._people, self._rollouts = PeopleRule(settings), Rollouts(settings, asks_beside=True)
+        self._people, self._rollouts = _rules(settings)
         self.stance = Stance.FREE
         self.interventions = Interventions()
         self._late_s = 0.0  # that setpoints are later than usual
@@ -101,8 +101,7 @@ class Guard:
         self._late_s, usual = late_s, self._usual
         later = {"reaction_s": usual.reaction_s + late_s, "hears_s": usual.hears_s + late_s}
         self.settings = usual.model_copy(update=later)
-        self._people = PeopleRule(self.settings)
-        self._rollouts = Rollouts(self.settings, asks_beside=True)
+        self._people, self._rollouts = _rules(self.settings)
 
     def is_lost(self, own: Own) -> bool:
         """Whether the owner was not seen for so long that it is the end; who has just begun may look for them first."""
@@ -290,3 +289,8 @@ class Guard:
     def _count(self, why: str, wanted: Floats, kept: Floats) -> None:
         if float(np.hypot(*(wanted - kept))) > _COUNTED_M_S:
             self.interventions.note(why)
+
+
+def _rules(s: GuardSettings) -> tuple[PeopleRule, Rollouts]:
+    """Of people, and of what is solid; its camera looks ahead."""
+    return PeopleRule(s), Rollouts(s, asks_beside=True)
