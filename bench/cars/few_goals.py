@@ -7,7 +7,11 @@ from bench.cars.experiment import Experiment, Judged
 # The document's own goals, start and blocks, on which every row of these is judged.
 _AS_PUBLISHED = {"starts": "published", "obstacles": "published", "mirrored": False}
 _ANYWHERE = {"starts": "anywhere", "obstacles": "anywhere"}
-_TWO_MILLION: dict[str, Any] = {"behavior.max_steps": 2_000_000, "behavior.success_target": None}
+_TWO_MILLION: dict[str, Any] = {
+    "behavior.max_steps": 2_000_000,
+    "behavior.success_target": None,
+    "behavior.keep_best": False,
+}
 _FEW_GOALS = (
     Judged("the goals of training", _AS_PUBLISHED),
     Judged("new spots", _AS_PUBLISHED | {"split": "test", "goals": "anywhere"}),
