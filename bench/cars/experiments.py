@@ -180,7 +180,8 @@ good with curiosity, for a while with RND.
 
 Three stacked observations make no difference to Parking 2 that five seeds could show beside the row of the headline:
 the same recipe, both ended by its success target. They are ours, with distances and
-speed in them; the document stacks directions.
+speed in them. The document's own, stacked likewise: three seeds of five park on 99 % of the spots of both storeys, two
+never find the second storey in ten million steps.
 
 On the tasks of the documents no gain was found. Two more were tried with RND, one seed each. A4 with 2 x 128 units, by
 the seed that comes to 0.2 % with PPO alone, came to 0.5 % with a strength of 0.1. Parking 2's one published spot, paid
