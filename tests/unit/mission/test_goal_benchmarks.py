@@ -60,10 +60,12 @@ def test_what_is_wrong_is_refused_in_a_sentence(words, sentence):
     assert sentence in result.stderr
 
 
-@pytest.mark.parametrize(("task", "condition"), [("navigate", "200-late-100"), ("park", "late-200")])
-def test_a_flight_is_shown_and_written(task, condition, tmp_path):
+@pytest.mark.parametrize(
+    ("task", "condition", "seed"), [("navigate", "200-late-100", "3940001"), ("park", "late-200", "3940005")]
+)
+def test_a_flight_is_shown_and_written(task, condition, seed, tmp_path):
     out = tmp_path / "out"
-    words = ("--condition", condition, "--flights", "1", "--seed", "3940001", "--jobs", "1")
+    words = ("--condition", condition, "--flights", "1", "--seed", seed, "--jobs", "1")
     result = honeyguide(task, *words, "--guard-setting", "crown_m=0.9", "--out", str(out))
     assert result.exit_code in {0, 1}, result.output
     record = json.loads((out / "flights.json").read_text())
