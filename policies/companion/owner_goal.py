@@ -27,9 +27,7 @@ from policies.tasks.navigate.walking_goal import CLOSING_HZ
 KEPT_M = 1.5  # on the level, from an owner whose place is known
 DEVIATIONS = 2.0  # that it keeps away farther, of the error of their place
 IMAGE_OLD_US = 300_000  # guess: three images missed; then it goes by the phone alone
-BLIND_US = round(
-    IMAGES_S * 1e6
-)  # after so long without an image to go by it says so; as long as who follows by images waits
+BLIND_US = round(IMAGES_S * 1e6)  # so long without an image to go by it says so, as who follows by images waits
 LOST = "owner lost"
 _BRAKE_M_S2 = 1.0  # before where they are looked for
 

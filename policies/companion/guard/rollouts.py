@@ -77,10 +77,10 @@ class Rollouts:
             people: who are kept off besides; the wanted velocity does so, as far as it can be.
         """
         s = self._s
-        clearance = around.clearance(own.pos_ned, own.boot_us)
+        here, clearance = np.array(own.pos_ned[:2]), around.clearance(own.pos_ned, own.boot_us)
         if self._asks_beside:
-            clearance = clearance.with_room_seen(np.array(own.pos_ned[:2]))
-        here_m = float(clearance.at(np.array(own.pos_ned[:2]))[0])
+            clearance = clearance.with_room_seen(here)
+        here_m = float(clearance.at(here)[0])
         wants = self._judged(wanted[None], last, own, clearance, here_m, people)
         if wants.is_clear[0] and wants.is_allowed[0] and wants.least_m[0] >= s.solid_m + _SLACK_M:
             return wanted  # nothing costs less

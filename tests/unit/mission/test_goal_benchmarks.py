@@ -64,6 +64,7 @@ def test_what_is_wrong_is_refused_in_a_sentence(words, sentence):
     ("task", "condition", "seed"), [("navigate", "200-late-100", "3940001"), ("park", "late-200", "3940005")]
 )
 def test_a_flight_is_shown_and_written(task, condition, seed, tmp_path):
+    """Seeds that what ships arrives with; it does not with each: how often is the benchmark's to say."""
     out = tmp_path / "out"
     words = ("--condition", condition, "--flights", "1", "--seed", seed, "--jobs", "1")
     result = honeyguide(task, *words, "--guard-setting", "crown_m=0.9", "--out", str(out))
