@@ -4,7 +4,7 @@ In: sights of people, and where the owner is expected. Out: those that are not k
 seen is first matched with whom is expected nearest, the owner among them; looks count in it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from policies.companion.senses.seen_owner import PersonNow, SeenOwner, Sight
 Floats = NDArray[np.float64]
 _MAX = 6
 _NEAR_M = 1.0  # from where they are expected
-_FORGOTTEN_US = 1_500_000
+_FORGOTTEN_US = 3_000_000
 _APART_M = 0.6  # nearer to somebody, a second one is a part of them
 _FAVOUR_M = 0.25  # so much farther off the owner is still the likelier
 _LIKE_M = 0.2  # and who looks alike, for each logarithm
@@ -25,6 +25,9 @@ _LATELY_US = 600_000
 _TOGETHER_US = 300_000  # who was there so long before the owner went is not the owner
 _WALKS_M = 1.0
 _SIGHTS, _WALK_M_S = 4, 0.7  # from so many on, faster than this, somebody is surely on their way
+_STANDS_M = 2.0  # so near the vehicle who stands may walk into it,
+_STANDS = {"vel": np.zeros(2), "vel_var": 0.1 * np.eye(2)}  # and is where they were seen, or a step from there
+_STANDS_S = 0.2  # as if they had been seen so long ago; guess
 _OWNER = -1
 
 
@@ -102,15 +105,28 @@ class OtherPeople:
         """Those who were seen lately, in order, and how well they fit the phone."""
         return [Suitor(one.person.person_now(time_us), one.fit, one.person.looks) for one in self._lately(time_us)]
 
-    def now(self, time_us: int, *, may_stand: bool = False) -> list[PersonNow]:
-        """What is known of those who were seen lately and walk: whom a trunk is taken for does not.
+    def now(self, time_us: int, here: Floats, *, may_stand: bool = False) -> list[PersonNow]:
+        """What is known of those who were seen lately and walk, and of those who stand, or stood, beside the vehicle.
+
+        Who stands farther off may be a trunk that is taken for somebody, and is in the map. Beside the vehicle the
+        camera loses sight of them, and they may set off at it.
 
         Args:
             time_us: the vehicle's clock.
-            may_stand: they need not walk.
+            here: [m] where it is, north and east.
+            may_stand: the others need not walk.
         """
-        known = [one.person.person_now(time_us) for one in self._lately(time_us) if one.person.sights >= _SIGHTS]
-        return [person for person in known if may_stand or float(np.hypot(*person.vel)) > _WALK_M_S]
+        found = []
+        for one in self._known:
+            person = one.person.person_now(time_us)
+            if one.person.sights < _SIGHTS:
+                continue
+            walks, is_late = float(np.hypot(*person.vel)) > _WALK_M_S, person.silence_s >= _LATELY_US * 1e-6
+            if not is_late and (walks or may_stand):
+                found.append(person)
+            elif not walks and float(np.hypot(*(person.pos_ned[:2] - here))) < _STANDS_M:
+                found.append(replace(person, **_STANDS, silence_s=min(person.silence_s, _STANDS_S)))
+        return found
 
     def exchange(self, index: int, owner: Tracked | None, time_us: int) -> Tracked:
         """One of those who were heard is the owner, who was taken for the owner is another; the owner."""
