@@ -22,8 +22,9 @@ from policies.tasks.follow_me.track import Ranges
 from policies.tasks.follow_me.tracked.keep_off import SLOW_S
 
 PLOT = Path(__file__).parents[1] / "results" / "images" / "failures.png"
-FLIGHTS = (("late-setpoints", 3938049), ("phone", 3938009), ("lost", 3938057))
-SHOWN_S = 16.0  # about the moment
+FLIGHTS = (("twins", 3947051), ("phone", 3947111), ("gone-8-silent", 3947061))
+SHOWN_S = 16.0
+BEFORE_S = 4.0  # that the owner was lost
 MARKS_S = 4.0
 BAND = Ranges()
 
@@ -47,7 +48,7 @@ def fly(name: str, seed: int) -> Seen:
     flight, companion = flight_with_companion(
         flight_of(condition, seed), load_follower(FOLLOWER), guard=GuardSettings()
     )
-    seen = Seen(f"{condition.title}, seed {seed}", flight.world.trees)
+    seen = Seen(f"{condition.title},\nseed {seed}", flight.world.trees)
 
     def look(watch: FollowWatch) -> None:
         if watch.sample_count <= len(seen.vehicle):
@@ -67,15 +68,15 @@ def fly(name: str, seed: int) -> Seen:
 
 
 def moment(seen: Seen) -> int:
-    """The sample it is about: the last, if something was hit; else the end of the longest time out of the band."""
+    """The last sample that is shown: of all, if something was hit; else some time into the longest out of the band."""
     if seen.has_hit:
         return len(seen.vehicle) - 1
-    longest = run = last = 0
+    longest = run = began = 0
     for k, far_m in enumerate(seen.distance_m):
         run = 0 if BAND.near_m <= far_m <= BAND.far_m else run + 1
         if run > longest:
-            longest, last = run, k
-    return last
+            longest, began = run, k + 1 - run
+    return min(began + round((SHOWN_S - BEFORE_S) / 0.1), len(seen.vehicle) - 1)
 
 
 def draw(seen: Seen, above: Any, below: Any) -> None:

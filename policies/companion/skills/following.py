@@ -183,6 +183,7 @@ class Following:
         return self._sight is not None and self._sight.is_away
 
     def begin(self, own: Own) -> None:
+        self._is_flying = True
         self._pilot.reset()
         if self._tracked is not None:
             self._tracked.begin(own)

@@ -27,8 +27,11 @@ class Images:
 
     age_us = 0  # of each image when it comes in
     lens = LENS
+    is_stuck = False
 
     def take(self, time_us):
+        if self.is_stuck:
+            return None
         return ImageFrame(time_us - self.age_us, 0, self._pixels, *self.lens) if time_us % 100_000 == 0 else None
 
     def close(self):
@@ -154,6 +157,21 @@ def test_pictures_taken_long_ago_are_none_even_if_they_come_in_now(age_us, is_ta
     air.run(1.0)
     assert (air.companion.trouble != NO_IMAGES) is is_taken
     assert (air.companion.phase is Phase.FLYING) is is_taken
+
+
+def test_control_is_not_given_back_for_pictures_that_grow_old_as_it_is_taken(monkeypatch):
+    monkeypatch.setattr(Following, "loss", lambda *_: "")  # the owner is known
+    air = Air(GuardSettings())
+    air.run(1.0)
+    air.images.is_stuck = True
+    air.run(0.48)
+    air.mode = Mode.OFFBOARD
+    air.run(1.0)  # the guard stands and waits for longer than who has not begun yet
+    assert air.companion.phase is Phase.FLYING
+    air.images.is_stuck = False
+    air.run(0.5)
+    assert air.companion.phase is Phase.FLYING
+    assert air.companion.trouble == ""
 
 
 @pytest.mark.parametrize("ahead_us", [3_000_000, 600_000_000])
