@@ -101,7 +101,6 @@ class GoalSkill:
         return False
 
     def begin(self, own: Own) -> None:
-        self._is_flying = True
         self._forget()
         self._stance = GoalStance.FREE
         if self.guard is not None:
