@@ -4,7 +4,7 @@ In: sights of people, and where the owner is expected. Out: those that are not k
 seen is first matched with whom is expected nearest, the owner among them; looks count in it.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,7 @@ from policies.companion.senses.seen_owner import PersonNow, SeenOwner, Sight
 Floats = NDArray[np.float64]
 _MAX = 6
 _NEAR_M = 1.0  # from where they are expected
-_FORGOTTEN_US = 1_500_000  # so long ago seen, nobody is told by them any more,
-_KEPT_US = 3_000_000  # and so long ago nobody is kept off them
+_FORGOTTEN_US = 1_500_000
 _APART_M = 0.6  # nearer to somebody, a second one is a part of them
 _FAVOUR_M = 0.25  # so much farther off the owner is still the likelier
 _LIKE_M = 0.2  # and who looks alike, for each logarithm
@@ -26,9 +25,6 @@ _LATELY_US = 600_000
 _TOGETHER_US = 300_000  # who was there so long before the owner went is not the owner
 _WALKS_M = 1.0
 _SIGHTS, _WALK_M_S = 4, 0.7  # from so many on, faster than this, somebody is surely on their way
-_BESIDE_M = 2.0  # who stands so near the vehicle may walk into it
-_STEP_M2_S2 = 0.1  # how uncertain it is that they stand,
-_TOLD_S = 0.1  # and as if they had been seen so long ago; guess
 _OWNER = -1
 
 
@@ -46,24 +42,6 @@ class _Known:
 
     def likeness(self, sight: Sight) -> float:
         return likeness(Looks(sight.colours, 1), self.person.looks)
-
-    def silence_us(self, time_us: int) -> int:
-        """Since they were seen."""
-        return time_us - self.person.time_us
-
-    def is_left_at(self, sight: Sight, time_us: int) -> bool:
-        """Whether they are not seen any more, and were last where this is."""
-        return (
-            self.silence_us(time_us) >= _LATELY_US and sight.off_m(self.person.now(self.person.time_us)[0]) < _APART_M
-        )
-
-    def standing(self, time_us: int) -> PersonNow | None:
-        """As somebody who stands where they were seen last; None: they walked then."""
-        then = self.person.person_now(self.person.time_us)
-        if _walks(then):
-            return None
-        still = {"vel": np.zeros(2), "vel_var": _STEP_M2_S2 * np.eye(2)}
-        return replace(then, **still, silence_s=min(self.silence_us(time_us) * 1e-6, _TOLD_S))
 
 
 class OtherPeople:
@@ -93,12 +71,8 @@ class OtherPeople:
         """
         if gone_us is not None:
             self._known = [one for one in self._known if one.met_us < gone_us - _TOGETHER_US]
-        self._known = [one for one in self._known if one.silence_us(pose.time_us) < _KEPT_US]
-        expected = {
-            k: one.person.now(pose.time_us)[0]
-            for k, one in enumerate(self._known)
-            if one.silence_us(pose.time_us) < _FORGOTTEN_US
-        }
+        self._known = [one for one in self._known if pose.time_us - one.person.time_us < _FORGOTTEN_US]
+        expected = {k: one.person.now(pose.time_us)[0] for k, one in enumerate(self._known)}
         if owner is not None:
             expected[_OWNER] = owner
         pairs = []
@@ -118,9 +92,6 @@ class OtherPeople:
                 one.person.see(sights[k], pose)
                 if sights[k].off_m(one.first_ned) > _WALKS_M:
                     self.met_us = pose.time_us
-        for k, who in taken.items():
-            if who == _OWNER:  # nobody else stands where they are
-                self._known = [one for one in self._known if not one.is_left_at(sights[k], pose.time_us)]
         return [k for k in range(len(sights)) if taken.get(k, _OWNER) == _OWNER]
 
     def forget(self) -> None:
@@ -131,30 +102,15 @@ class OtherPeople:
         """Those who were seen lately, in order, and how well they fit the phone."""
         return [Suitor(one.person.person_now(time_us), one.fit, one.person.looks) for one in self._lately(time_us)]
 
-    def now(self, time_us: int, here: Floats, *, may_stand: bool = False) -> list[PersonNow]:
-        """What is known of those who were seen lately and walk, and of those who stand beside the vehicle.
-
-        Who stands farther off may be a trunk that is taken for somebody, and is in the map. Beside the vehicle the
-        camera loses sight of them, and they may set off at it: for a while they are reckoned with as if seen.
+    def now(self, time_us: int, *, may_stand: bool = False) -> list[PersonNow]:
+        """What is known of those who were seen lately and walk: whom a trunk is taken for does not.
 
         Args:
             time_us: the vehicle's clock.
-            here: [m] where it is, north and east.
-            may_stand: the others need not walk.
+            may_stand: they need not walk.
         """
-        found = []
-        for one in self._known:
-            if one.person.sights < _SIGHTS:
-                continue
-            if one.silence_us(time_us) < _LATELY_US:
-                person = one.person.person_now(time_us)
-                if may_stand or _walks(person) or _is_beside(person, here):
-                    found.append(person)
-            elif one.silence_us(time_us) < _KEPT_US:
-                left = one.standing(time_us)
-                if left is not None and _is_beside(left, here):
-                    found.append(left)
-        return found
+        known = [one.person.person_now(time_us) for one in self._lately(time_us) if one.person.sights >= _SIGHTS]
+        return [person for person in known if may_stand or float(np.hypot(*person.vel)) > _WALK_M_S]
 
     def exchange(self, index: int, owner: Tracked | None, time_us: int) -> Tracked:
         """One of those who were heard is the owner, who was taken for the owner is another; the owner."""
@@ -170,23 +126,15 @@ class OtherPeople:
         self._known.append(_Known(person, time_us, person.now(time_us)[0], fit))
 
     def _lately(self, time_us: int) -> list[_Known]:
-        return [one for one in self._known if one.silence_us(time_us) < _LATELY_US]
+        return [one for one in self._known if time_us - one.person.time_us < _LATELY_US]
 
     def meet(self, sights: list[Sight], owner: Floats | None, pose: Pose) -> None:
         """Each of these is somebody new, but for what may be a part of the owner or of who is known."""
-        known = [one.person.now(pose.time_us)[0] for one in self._known if one.silence_us(pose.time_us) < _FORGOTTEN_US]
-        for sight in sights[: max(_MAX - len(known), 0)]:
+        known = [one.person.now(pose.time_us)[0] for one in self._known]
+        for sight in sights[: max(_MAX - len(self._known), 0)]:
             beside = [*known, *([owner] if owner is not None else [])]
             if any(sight.off_m(other) < _APART_M for other in beside):
                 continue
             one = _Known(SeenOwner(), pose.time_us, sight.place_ned, PhoneFit())
             one.person.see(sight, pose)
             self._known.append(one)
-
-
-def _walks(person: PersonNow) -> bool:
-    return float(np.hypot(*person.vel)) > _WALK_M_S
-
-
-def _is_beside(person: PersonNow, here: Floats) -> bool:
-    return float(np.hypot(*(person.pos_ned[:2] - here))) < _BESIDE_M

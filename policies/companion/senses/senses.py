@@ -187,7 +187,7 @@ class Senses:
 
     def others_now(self, own: Own) -> list[PersonNow]:
         """Where people are who were seen and not taken for the owner: one of them may be."""
-        return self._others.now(own.boot_us, np.array(own.pos_ned[:2]), may_stand=self._is_by_colours)
+        return self._others.now(own.boot_us, may_stand=self._is_by_colours)
 
     def _owner_then(self, time_us: int, own: Own) -> tuple[Floats, Floats] | None:
         """Where the owner was when an image was taken, and how fast; None: nobody knows."""

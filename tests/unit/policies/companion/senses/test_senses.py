@@ -158,34 +158,3 @@ def test_who_stands_in_the_way_counts_where_no_depth_puts_them_on_the_map(scene:
     others = scene.senses.others_now(scene.own)
     assert len(others) == count
     assert all(person.pos_ned[:2] == pytest.approx([2.5, 0.6], abs=0.1) for person in others)
-
-
-def test_who_stood_beside_the_vehicle_is_kept_off_for_three_seconds_out_of_the_image(scene: Scene) -> None:
-    scene.look((5.0, 0.0), times=10)
-    scene.look((5.0, 0.0), (1.5, 0.6), times=5)
-    scene.look((5.0, 0.0), times=25)
-    (person,) = scene.senses.others_now(scene.own)
-    assert person.pos_ned[:2] == pytest.approx([1.5, 0.6], abs=0.1)
-    assert person.vel == pytest.approx([0.0, 0.0])
-    scene.look((5.0, 0.0), times=10)
-    assert scene.senses.others_now(scene.own) == []
-
-
-def test_who_walked_out_of_the_image_is_forgotten(scene: Scene) -> None:
-    scene.look((5.0, 0.0), times=10)
-    for k in range(8):
-        scene.look((5.0, 0.0), (1.5, 0.14 * k), times=1)
-    assert len(scene.senses.others_now(scene.own)) == 1
-    for _ in range(4):
-        scene.look((5.0, 0.0), times=6)
-        assert scene.senses.others_now(scene.own) == []
-
-
-def test_who_stands_where_the_owner_is_now_is_nobody_else(scene: Scene) -> None:
-    scene.look((3.0, 0.0), times=10)
-    scene.look((3.0, 0.0), (1.5, 0.6), times=5)
-    scene.look((3.0, 0.0), times=7)
-    assert len(scene.senses.others_now(scene.own)) == 1
-    for k in range(8):
-        scene.look((3.0 - 0.18 * k, 0.07 * k), times=1)
-    assert scene.senses.others_now(scene.own) == []
