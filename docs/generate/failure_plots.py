@@ -24,7 +24,7 @@ from policies.tasks.follow_me.tracked.keep_off import SLOW_S
 PLOT = Path(__file__).parents[1] / "results" / "images" / "failures.png"
 FLIGHTS = (("crossed", 3947055), ("phone", 3947111), ("gone-8-silent", 3947061))
 SHOWN_S = 16.0
-BEFORE_S = 4.0  # the band was left
+BEFORE_S = 4.0  # of these are from before it left the band
 MARKS_S = 4.0
 BAND = Ranges()
 
