@@ -88,12 +88,13 @@ class Companion:
         if self._sticks is not None:
             self._sticks.frame(time_us)
         begun_s = self._wall_s() if self._wall_s is not None else None  # a guard looks at the image as it comes in
-        has_sensed = skill.receive(vehicle, time_us)
+        is_flying = self._sending is Sending.POLICY  # so far
+        has_sensed = skill.receive(vehicle, time_us, is_flying=is_flying)
         if skill.is_ordered():
             self.engagement.engage(is_flown=vehicle.is_flown)
             self._is_sent_in_guided = vehicle.own.mode is Mode.GUIDED
         blindness = self._blindness(time_us)
-        loss = skill.loss(vehicle.own)
+        loss = skill.loss(vehicle.own, is_flying=is_flying)
         self.trouble = blindness or loss or (NO_DECISION if self._is_undecided else "")
         orders = self.engagement.step(self._situation(time_us, is_lost=bool(loss) and not blindness))
         if orders.text:
@@ -232,7 +233,7 @@ class Companion:
         is_placed = isfinite(own.pos_ned[0])
         if not is_placed or time_us - min(own.attitude_us, own.position_us) > TELEMETRY_OLD_US:
             return "no attitude or position from the vehicle"
-        blindness = self.skill.blindness(own, time_us)
+        blindness = self.skill.blindness(own, time_us, is_flying=self._sending is Sending.POLICY)
         return blindness or (self._sticks.trouble if self._sticks is not None else "")
 
     @property

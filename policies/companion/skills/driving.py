@@ -82,17 +82,18 @@ class Driving(GoalSkill):
         if not vehicle.is_by_sticks:
             vehicle.listen("PARAM_VALUE", self._parameter_reported)
 
-    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
+    def receive(self, vehicle: VehicleLink, time_us: int, *, is_flying: bool) -> bool:
         if self._needs_reverse and vehicle.own.heartbeat_us != NEVER_US and time_us - self._asked_us > ASK_US:
             self._asked_us = time_us
             vehicle.ask("PARAM_REQUEST_READ", param_id=REVERSES, param_index=-1)
-        return super().receive(vehicle, time_us)
+        return super().receive(vehicle, time_us, is_flying=is_flying)
 
-    def blindness(self, own: Own, time_us: int) -> str:
-        return super().blindness(own, time_us) or (NO_REVERSE if self._needs_reverse and not self._reverses else "")
+    def blindness(self, own: Own, time_us: int, *, is_flying: bool) -> str:
+        blindness = super().blindness(own, time_us, is_flying=is_flying)
+        return blindness or (NO_REVERSE if self._needs_reverse and not self._reverses else "")
 
-    def loss(self, own: Own) -> str:
-        trouble = super().loss(own)
+    def loss(self, own: Own, *, is_flying: bool) -> str:
+        trouble = super().loss(own, is_flying=is_flying)
         if trouble or self._still_count >= STUCK_FOR:
             return trouble or STUCK
         return TAKEN if self._taken_count >= SEEN_FOR else ""

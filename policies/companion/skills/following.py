@@ -101,7 +101,6 @@ class Following:
         self._vehicle: VehicleLink | None = None
         self._stance = Stance.FREE  # as told
         self._beginning = BeginningReasons()
-        self._is_flying = False
         self._owner = Owner()
         self._image: ImageFrame | None = None  # the newest
         self._image_us = -1  # when it came in, on our clock; -1: never
@@ -126,7 +125,7 @@ class Following:
             self._sight.attach(vehicle)
             self._delay.attach(vehicle)
 
-    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
+    def receive(self, vehicle: VehicleLink, time_us: int, *, is_flying: bool) -> bool:  # noqa: ARG002
         self._owner = vehicle.owner
         self._delay.step(time_us)  # before anything that takes time
         image = self._taken(vehicle, time_us)
@@ -150,9 +149,9 @@ class Following:
     def is_ordered(self) -> bool:
         return False
 
-    def blindness(self, own: Own, time_us: int) -> str:
+    def blindness(self, own: Own, time_us: int, *, is_flying: bool) -> str:
         image = self._image
-        old_us = GUARDED_OLD_US if self.guard is not None and self._is_flying else IMAGE_OLD_US
+        old_us = GUARDED_OLD_US if self.guard is not None and is_flying else IMAGE_OLD_US
         if image is None or max(time_us - self._image_us, own.boot_us - image.time_us) > old_us:
             return OTHER_CLOCK if self._is_early else NO_IMAGES  # none came in, or what came in was old
         return misfit(image, self._pilot.image_shape)
@@ -165,8 +164,8 @@ class Following:
             self._is_early = image.time_us - vehicle.own.boot_us > IMAGE_EARLY_US
         return None if self._is_early else image
 
-    def loss(self, own: Own) -> str:
-        if self.guard is not None and self._is_flying:
+    def loss(self, own: Own, *, is_flying: bool) -> str:
+        if self.guard is not None and is_flying:
             return "owner lost" if self.guard.is_lost(own) else ""
         return "owner lost" if self._watch.silence_s(own.boot_us) > OWNER_LOST_S else ""
 
@@ -183,19 +182,18 @@ class Following:
         return self._sight is not None and self._sight.is_away
 
     def begin(self, own: Own) -> None:
-        self._is_flying = True
         self._pilot.reset()
         if self._tracked is not None:
             self._tracked.begin(own)
         if self.guard is not None:
             self.guard.begin(own)
 
-    def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:
+    def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:  # noqa: ARG002
         """Lets the pilot see the newest image.
 
         Who does not fly looks too: the owner must have been seen before anybody flies by sight.
         """
-        image, self._is_flying = self._image, is_flying
+        image = self._image
         if image is None:
             return None
         self._decided_us, self._is_new = time_us, False

@@ -65,7 +65,6 @@ class GoalSkill:
         self.guard = guard
         self._stance = GoalStance.FREE  # as told
         self._beginning = BeginningReasons()
-        self._is_flying = False
 
     @property
     def interventions(self) -> Interventions | None:
@@ -75,23 +74,23 @@ class GoalSkill:
     def stance(self) -> str:
         return "" if self.guard is None else self.guard.stance.value
 
-    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
+    def receive(self, vehicle: VehicleLink, time_us: int, *, is_flying: bool) -> bool:
         self.goals.frame(time_us)
         self.ranges.follow()
         is_new = self.ranges.take_new()
         if self.guard is None:
             return is_new
         self.guard.sense(vehicle.own, self.ranges)
-        return is_new or (self._is_flying and time_us - self._decided_us >= DECISION_US + DECISION_LATE_US)
+        return is_new or (is_flying and time_us - self._decided_us >= DECISION_US + DECISION_LATE_US)
 
     def is_ordered(self) -> bool:
         return self.goals.is_ordered()
 
-    def blindness(self, own: Own, time_us: int) -> str:  # noqa: ARG002
-        is_guarded = self.guard is not None and self._is_flying
+    def blindness(self, own: Own, time_us: int, *, is_flying: bool) -> str:  # noqa: ARG002
+        is_guarded = self.guard is not None and is_flying
         return self.ranges.trouble(time_us, GUARDED_OLD_US if is_guarded else OLD_US)
 
-    def loss(self, own: Own) -> str:  # noqa: ARG002
+    def loss(self, own: Own, *, is_flying: bool) -> str:  # noqa: ARG002
         return "" if self.goals.goal is not None else self.goals.done or NO_GOAL
 
     def is_alone(self, own: Own) -> bool:  # noqa: ARG002
@@ -105,7 +104,6 @@ class GoalSkill:
         self._stance = GoalStance.FREE
         if self.guard is not None:
             self.guard.begin(own)
-        self._decided_us = -DECISION_US
 
     @property
     def record_layout(self) -> Layout:
@@ -142,7 +140,6 @@ class GoalSkill:
 
     def _act(self, vector: Floats, *, is_flying: bool) -> Floats:
         """The action on an observation."""
-        self._is_flying = is_flying
         self.seen = vector.copy()
         action = self._pilot.act(vector)
         if not is_flying or not np.isfinite(action).all():

@@ -53,7 +53,7 @@ class Skill(Protocol):
         """Says what it has to hear; once, before anything is received."""
         ...
 
-    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
+    def receive(self, vehicle: VehicleLink, time_us: int, *, is_flying: bool) -> bool:
         """Takes in what its sensors and its clients have sent; whether there is something new to decide on."""
         ...
 
@@ -61,11 +61,11 @@ class Skill(Protocol):
         """Whether somebody has asked it to fly since the last call, other than by choosing Offboard."""
         ...
 
-    def blindness(self, own: Own, time_us: int) -> str:
+    def blindness(self, own: Own, time_us: int, *, is_flying: bool) -> str:
         """Why there is nothing to decide on; "" if there is."""
         ...
 
-    def loss(self, own: Own) -> str:
+    def loss(self, own: Own, *, is_flying: bool) -> str:
         """Why it cannot fly, or need not any more, though it sees; "" if it can."""
         ...
 

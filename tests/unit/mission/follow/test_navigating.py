@@ -121,6 +121,21 @@ def test_a_scanner_that_falls_silent_makes_it_stand_and_ends_in_hold():
     assert "Companion: hold: no ranges all round" in flight.drone.texts
 
 
+def test_a_scanner_that_falls_silent_as_control_is_taken_makes_it_stand_too():
+    flight, companion = hovering(is_reported=False)
+    send_goto(flight, place(flight, 45.0, -20.0), AUTOPILOT)
+    advance(flight, 1.0)
+    lose(companion, "OBSTACLE_DISTANCE")
+    flight.drone.send(
+        "COMMAND_LONG", target_system=1, target_component=1, command=176, param1=1, param2=6, confirmation=0
+    )
+    advance(flight, 1.5)
+    assert (companion.phase, mode(flight)) == (Phase.FLYING, Mode.OFFBOARD)
+    advance(flight, 2.0)
+    assert mode(flight) is Mode.HOLD
+    assert companion.trouble == "no ranges all round"
+
+
 def test_the_companion_sees_what_training_sees():
     flight, companion = hovering()
     goal_ned = place(flight, 45.0, -20.0)

@@ -160,7 +160,7 @@ def test_pictures_taken_long_ago_are_none_even_if_they_come_in_now(age_us, is_ta
 
 
 def test_control_is_not_given_back_for_pictures_that_grow_old_as_it_is_taken(monkeypatch):
-    monkeypatch.setattr(Following, "loss", lambda *_: "")  # the owner is known
+    monkeypatch.setattr(Following, "loss", lambda *_, **__: "")  # the owner is known
     air = Air(GuardSettings())
     air.run(1.0)
     air.images.is_stuck = True
