@@ -1,10 +1,10 @@
-"""`python -m bench.drive_mavlink [SCENES] [park|reach] [sticks] [seed=N] [lag=SECONDS] [POLICY]`: Drive over MAVLink.
+"""`python -m bench.drive_mavlink [SCENES] [park|reach] [sticks] [guard] [seed=N] [lag=S] [POLICY]`: Drive over MAVLink.
 
 One rover at a time, in lockstep: the whole flight controller, the messages of its ring of range finders, a companion
 computer with the policy, a goto sent to it. The scenes are those of the batch: held-out worlds, goals, headings at the
 start, wind, noise, masses, motors and tyres are drawn by the task, which then plays the same scenes itself. In: how
-many scenes, of what, by sticks or setpoints, of which seed, how late the ranges come, which policy. Out: both rates
-side by side; of the policies that ship, in docs/results/drive.md.
+many scenes, of what, by sticks or setpoints, under the guard or not, of which seed, how late the ranges come, which
+policy. Out: both rates side by side; of the policies that ship, in docs/results/drive.md.
 """
 
 import sys
@@ -38,6 +38,7 @@ from policies.tasks.episode import Outcome
 from sim.world.world import WorldMap
 
 SCENES = 300
+WORDS = ("sticks", "guard")
 READY_S, ALL_S = 60.0, 240.0
 UNGUARDED = GuardSettings(is_on=False)  # the policy alone, as in the batch
 SECTION = f"""\
@@ -91,7 +92,14 @@ def scenes_of(preset: str, count: int, seed: int = SEED) -> list[Scene]:
     ]
 
 
-def driven(scene: Scene, pilot: DrivingPilot, *, is_by_sticks: bool = False, scan_lag_s: float = 0.0) -> Arrival:
+def driven(
+    scene: Scene,
+    pilot: DrivingPilot,
+    *,
+    is_by_sticks: bool = False,
+    guard: GuardSettings = UNGUARDED,
+    scan_lag_s: float = 0.0,
+) -> Arrival:
     """One drive over MAVLink, the ranges so late [s]."""
     config = FlightConfig(
         airframe="rover",
@@ -103,7 +111,7 @@ def driven(scene: Scene, pilot: DrivingPilot, *, is_by_sticks: bool = False, sca
         parameters=REVERSES,
         scan_lag_s=scan_lag_s,
     )
-    flight, companion = flight_with_driver(config, pilot, is_by_sticks=is_by_sticks, world=scene.world, guard=UNGUARDED)
+    flight, companion = flight_with_driver(config, pilot, is_by_sticks=is_by_sticks, world=scene.world, guard=guard)
     try:
         for name in ("model", "body", "truth"):  # as the episode's vehicle stands there
             flight.rig.rows[name][0] = scene.rows[name]
@@ -145,6 +153,7 @@ def measured(
     count: int,
     *,
     is_by_sticks: bool = False,
+    guard: GuardSettings = UNGUARDED,
     seed: int = SEED,
     scan_lag_s: float = 0.0,
 ) -> str:
@@ -153,7 +162,7 @@ def measured(
     pilot = DrivingPilot(policy, source)
     arrivals, scenes = [], scenes_of(preset, count, seed)
     for i, scene in enumerate(scenes):
-        arrivals.append(driven(scene, pilot, is_by_sticks=is_by_sticks, scan_lag_s=scan_lag_s))
+        arrivals.append(driven(scene, pilot, is_by_sticks=is_by_sticks, guard=guard, scan_lag_s=scan_lag_s))
         if not arrivals[-1].is_there:
             print(i, arrivals[-1], Outcome(int(drives.outcomes[i])).name, flush=True)
     batch = drives.outcomes == Outcome.SUCCESS
@@ -183,16 +192,25 @@ def main(arguments: list[str]) -> int:
     arguments = [text for text in arguments if not text.startswith(("seed=", "lag="))]
     count = next((int(text) for text in arguments if text.isdigit()), SCENES)
     presets = [preset for preset in AIMS if preset in arguments] or list(AIMS)
-    named = [text for text in arguments if not text.isdigit() and text not in (*AIMS, "sticks")]
-    is_by_sticks = "sticks" in arguments
-    if not changed and not is_by_sticks and not named and len(presets) == len(AIMS) and PAGE_FILE.is_file():
+    named = [text for text in arguments if not text.isdigit() and text not in (*AIMS, *WORDS)]
+    if not changed and not named and not {*WORDS} & {*arguments} and len(presets) == len(AIMS) and PAGE_FILE.is_file():
         write_section({preset: find_policy(f"drive-{preset}") for preset in presets}, count)
         return 0
     for preset in presets:
         path = find_policy(named[0] if named else f"drive-{preset}")
         seed, lag_s = int(changed.get("seed", SEED)), float(changed.get("lag", 0.0))
         policy, _ = load_policy(path)
-        line = measured(preset, policy, str(path), count, is_by_sticks=is_by_sticks, seed=seed, scan_lag_s=lag_s)
+        guard = GuardSettings() if "guard" in arguments else UNGUARDED
+        line = measured(
+            preset,
+            policy,
+            str(path),
+            count,
+            is_by_sticks="sticks" in arguments,
+            guard=guard,
+            seed=seed,
+            scan_lag_s=lag_s,
+        )
         print(line, flush=True)
     return 0
 

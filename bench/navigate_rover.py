@@ -6,6 +6,7 @@ the rows; those of the policy that ships go into docs/results/navigate-rover.md.
 """
 
 import sys
+from itertools import product
 from math import cos, pi, sin
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from mission.client import Client
 from mission.flight import FlightConfig
 from mission.follow.lockstep import flight_with_navigator
 from mission.simulator.flight_rig import TURBULENCE
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.vector_pilot import RoverNavigationPilot
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy
@@ -29,6 +31,8 @@ from sim.world.forest_world import WALLED_FOREST
 
 DENSITIES = (400.0, 600.0)
 DRIVES = 100  # of each density, over MAVLink
+GUARDS = {"no": UNGUARDED, "yes": GuardSettings()}
+LAGS_S = (0.0, 0.1)
 SLOWEST_M_S = 1.0  # the task's
 PAGE_FILE = Path(__file__).parent.parent / "docs" / "results" / "navigate-rover.md"
 PAGE = """\
@@ -48,27 +52,30 @@ speeds the bootstrap's. Made by `python -m bench.navigate_rover`; the task is to
 ## Over MAVLink
 
 The same policy, driven by its [companion](../how-to/companion.md): a goto is sent to it, the scanner's messages come
-to it, velocities go to mode Offboard, without the guard. {drives} drives of each density, one rover at a time, in
-lockstep; worlds, goals, wind and noise are drawn as above, the vehicle is that of the airframe file. Success is to
-come within 3 m, and to be handed back in mode Hold, untouched for 4 s more.
+to it, velocities go to mode Offboard. {drives} drives of each density, one rover at a time, in lockstep, with and
+without [the guard](../how-to/navigate.md#the-guard), the scanner on time or 100 ms late; worlds, goals, wind and noise
+are drawn as above, and alike in all rows of a density; the vehicle is that of the airframe file. Success is to come
+within 3 m, and to be handed back in mode Hold, untouched for 4 s more.
 
-| trees/ha | success | mean speed | rests off the goal, median | collisions | over the forest | other |
-|---|---|---|---|---|---|---|
+| guard | scans | trees/ha | success | mean speed | rests off the goal, median | collisions | over the forest | other |
+|---|---|---|---|---|---|---|---|---|
 {link}
 
 Measured on {machine}.
 """
 
 
-def drive(pilot: RoverNavigationPilot, trees_per_ha: float, seed: int) -> Crossing:
+def drive(
+    pilot: RoverNavigationPilot, trees_per_ha: float, seed: int, guard: GuardSettings, scan_lag_s: float
+) -> Crossing:
     """One drive; an odd seed is of a world that is not trained in."""
     rng = np.random.default_rng([seed, 0x4E52])
     wind_m_s, gust_m_s, noise = rng.uniform(0.0, 6.0), rng.uniform(0.0, 3.0), rng.uniform(0.5, 1.5)
     world = WALLED_FOREST.model_copy(
         update={"seed": seed, "trees_per_ha": trees_per_ha, "hill_height_m": rng.uniform(0.0, 3.0)}
     )
-    config = FlightConfig(airframe="rover", is_forest=True, world=world, seed=seed, noise=noise)
-    flight, companion = flight_with_navigator(config, pilot, guard=UNGUARDED)
+    config = FlightConfig(airframe="rover", is_forest=True, world=world, seed=seed, noise=noise, scan_lag_s=scan_lag_s)
+    flight, companion = flight_with_navigator(config, pilot, guard=guard)
 
     async def arm(drone: Client) -> None:
         await drone.wait_ready()
@@ -100,9 +107,11 @@ def main(arguments: list[str]) -> int:
         print(batch[-1], flush=True)
     pilot = RoverNavigationPilot(policy, str(path))
     count = int(arguments[1]) if len(arguments) > 1 else DRIVES
-    for k, trees_per_ha in enumerate(DENSITIES):
-        drives = [drive(pilot, trees_per_ha, FIRST_SEED + 2 * (i + k * DRIVES)) for i in range(count)]
-        link.append(told(trees_per_ha, drives))
+    for (name, guard), lag_s in product(GUARDS.items(), LAGS_S):
+        for k, trees_per_ha in enumerate(DENSITIES):
+            seeds = [FIRST_SEED + 2 * (i + k * DRIVES) for i in range(count)]
+            line = told(trees_per_ha, [drive(pilot, trees_per_ha, seed, guard, lag_s) for seed in seeds])
+            link.append(f"| {name} | {1000.0 * lag_s:.0f} ms late {line}")
     if arguments:
         return 0
     tables = {"batch": "\n".join(batch), "link": "\n".join(link)}
