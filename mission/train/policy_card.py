@@ -46,8 +46,7 @@ def card_rows(card: PolicyCard) -> Iterator[tuple[str, str]]:
         yield "reward, training", f"{card.figures['training_reward']:.3f}"
     yield "code", _code(card.code)
     if card.teacher:
-        known_by = card.teacher.get("weights_sha256", card.teacher.get("sha256", ""))  # older cards: of the whole file
-        yield "teacher", f"{card.teacher['policy']}: {_leg(card.teacher['card'])}; {known_by[:12]}"
+        yield "teacher", _teacher(card.teacher)
     for data in card.data:
         said = ", ".join(f"{name} {data[name]}" for name in _OF_DATASET if name in data)
         yield f"data, {data['use']}", f"{data['path']}: {said}"
@@ -74,7 +73,13 @@ def _code(code: Mapping[str, str]) -> str:
     return f"version {code['version']}, commit {code['commit']}" if code else "not known"
 
 
+def _teacher(teacher: Mapping[str, Any]) -> str:
+    known_by = teacher.get("weights_sha256", teacher.get("sha256", ""))  # older cards: of the whole file
+    return f"{teacher['policy']}: {_leg(teacher['card'])}; {known_by[:12]}"
+
+
 def _leg(card: Mapping[str, Any]) -> str:
     """Another policy's card, in short."""
     commit = card.get("code", {}).get("commit", "")
-    return f"{card['task']}, seed {card['seed']}, {card['steps']:,} steps" + (f", commit {commit}" if commit else "")
+    said = f"{card['task']}, seed {card['seed']}, {card['steps']:,} steps" + (f", commit {commit}" if commit else "")
+    return f"{said}; its teacher {_teacher(card['teacher'])}" if card.get("teacher") else said

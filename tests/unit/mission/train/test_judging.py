@@ -35,11 +35,14 @@ def test_a_cards_rows_name_teacher_data_and_the_legs_before():
     data = {"path": "shown", "use": "gail", "episodes": 3, "pilot": "expert"}
     teacher = {"policy": "master", "weights_sha256": "0123456789abcdef", "card": parent}
     figures = {"success_rate": 0.9, "success_low": 0.88, "success_high": 0.92, "episodes": 2000}
+    taught = {"task": "Hover", "seed": 5, "steps": 600, "teacher": teacher}
     rows = dict(card_rows(PolicyCard("Hover", {}, 1, 9, figures, {}, [parent], {}, teacher, [data])))
     assert rows["success, judged"] == "90.00 % (95 %: 88.00 to 92.00) of 2,000 episodes that it did not train on"
     assert rows["teacher"] == "master: Hover, seed 4, 500 steps, commit abc; 0123456789ab"
     assert rows["data, gail"] == "shown: episodes 3, pilot expert"
     assert rows["began with"] == "Hover, seed 4, 500 steps, commit abc"
+    (_, text) = list(card_rows(PolicyCard("Hover", {}, 1, 9, {}, {}, [taught])))[-1]
+    assert text == f"Hover, seed 5, 600 steps; its teacher {rows['teacher']}"
     assert rows["code"] == "not known"
 
 

@@ -11,7 +11,7 @@ from common.image_stream import ImageFrame
 from policies.companion.companion import MISFIT, NO_DECISION, NOT_ALONE, Companion
 from policies.companion.engagement import Phase
 from policies.companion.guard.settings import GuardSettings
-from policies.companion.senses.image_fit import LENS, NO_IMAGES, OTHER_CLOCK, OTHER_LENS
+from policies.companion.senses.image_fit import LENS, NO_IMAGES, OTHER_CLOCK, OTHER_LENS, OTHER_SIZE
 from policies.companion.skills.following import IMAGE_OLD_US, Following
 from policies.companion.vehicle_link import COMPONENT
 from policies.experts.follower import ScriptedFollower
@@ -23,16 +23,16 @@ class Images:
     """A camera that takes one at 10 Hz."""
 
     def __init__(self, shape):
-        self._pixels = np.zeros(shape, np.uint8)
+        self.shape = shape
 
     age_us = 0  # of each image when it comes in
     lens = LENS
     is_stuck = False
 
     def take(self, time_us):
-        if self.is_stuck:
+        if self.is_stuck or time_us % 100_000 != 0:
             return None
-        return ImageFrame(time_us - self.age_us, 0, self._pixels, *self.lens) if time_us % 100_000 == 0 else None
+        return ImageFrame(time_us - self.age_us, 0, np.zeros(self.shape, np.uint8), *self.lens)
 
     def close(self):
         pass
@@ -191,15 +191,30 @@ def test_pictures_that_telemetry_is_somewhat_later_than_are_flown_by():
     assert air.companion.phase is Phase.FLYING
 
 
-def test_pictures_of_another_lens_are_flown_by_by_nobody():
+@pytest.mark.parametrize(
+    ("name", "value", "trouble"),
+    [
+        ("lens", (70.0, *LENS[1:]), OTHER_LENS),
+        ("shape", (32, 32, 4), OTHER_SIZE),
+        ("shape", (64, 64, 3), OTHER_SIZE),  # no depth
+        ("shape", (64, 64), OTHER_SIZE),
+    ],
+)
+def test_pictures_of_another_lens_or_kind_are_flown_by_by_nobody(monkeypatch, name, value, trouble):
+    monkeypatch.setattr(Following, "loss", lambda *_, **__: "")  # the owner is known
     air = Air(GuardSettings())
     air.run(1.0)
+    air.mode = Mode.OFFBOARD
+    air.run(1.0)
+    assert air.companion.phase is Phase.FLYING
     senses = air.companion.skill.guard.senses
     taken_us = senses.image_us
     assert taken_us > 0
-    air.images.lens = (70.0, *LENS[1:])
-    air.run(1.0)
-    assert air.companion.trouble == OTHER_LENS
+    setattr(air.images, name, value)
+    reported = air.run(1.0)
+    assert air.companion.trouble == trouble
+    assert air.companion.phase is Phase.HANDING_BACK
+    assert f"Companion: hold: {trouble}" in [m.fields.text for m in reported if m.name == "STATUSTEXT"]
     assert senses.image_us == taken_us
 
 

@@ -87,6 +87,20 @@ def test_a_camera_that_falls_silent_without_a_goodbye_is_looked_for_again():
         camera.close()
 
 
+def test_a_stream_of_another_encoding_gives_no_pictures_and_says_why():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        camera = StreamCamera(f"tcp://127.0.0.1:{server.getsockname()[1]}")
+        camera.take(0)
+        first, _ = server.accept()
+        with first:
+            first.sendall(frame_bytes(frame(1)))
+            assert taken(camera, 100_000).sequence == 1
+            first.sendall(b"\xff\xd8\xff\xe0 a JPEG" + bytes(200))
+            assert taken(camera, 200_000) is None
+            assert "first bytes" in camera.trouble
+        camera.close()
+
+
 def taken(camera, time_us):
     """The image that comes in about now; None after a second of waiting."""
     for _ in range(100):
