@@ -31,7 +31,7 @@ _OWNER = -1
 Tracked = tuple[SeenOwner, PhoneFit]  # somebody, and how well they fit the phone
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class _Known:
     """One of them."""
 
@@ -39,6 +39,7 @@ class _Known:
     met_us: int  # when they were first seen,
     first_ned: Floats  # and where [m]
     fit: PhoneFit
+    is_unsure: bool = False  # they may be the owner: nobody knows
 
     def likeness(self, sight: Sight) -> float:
         return likeness(Looks(sight.colours, 1), self.person.looks)
@@ -58,19 +59,17 @@ class OtherPeople:
         owner: Floats | None,
         likeness_of: list[float],
         pose: Pose,
-        gone_us: int | None = None,
+        gone_us: float | None = None,
     ) -> list[int]:
-        """Indices of the sights that are of nobody whom it knows, the owner's among them; the others are taken in.
+        """Indices of the sights that may be of the owner: of nobody whom it knows; the others are taken in.
 
         Args:
             sights: of one image.
             owner: [m] where the owner is expected; None: nobody knows.
             likeness_of: each to the owner.
             pose: when and from where they were seen.
-            gone_us: when the owner was seen last, if they are gone: who was met since may be the owner.
+            gone_us: when the owner was seen last, if they are gone: who was met since may be the owner; -inf: anybody.
         """
-        if gone_us is not None:
-            self._known = [one for one in self._known if one.met_us < gone_us - _TOGETHER_US]
         self._known = [one for one in self._known if pose.time_us - one.person.time_us < _FORGOTTEN_US]
         expected = {k: one.person.now(pose.time_us)[0] for k, one in enumerate(self._known)}
         if owner is not None:
@@ -86,17 +85,17 @@ class OtherPeople:
         for _, k, who in sorted(pairs):
             if k not in taken and who not in taken.values():
                 taken[k] = who
+        for one in self._known:
+            one.is_unsure = gone_us is not None and one.met_us >= gone_us - _TOGETHER_US
         for k, who in taken.items():
-            if who != _OWNER:
-                one = self._known[who]
-                one.person.see(sights[k], pose)
-                if sights[k].off_m(one.first_ned) > _WALKS_M:
-                    self.met_us = pose.time_us
-        return [k for k in range(len(sights)) if taken.get(k, _OWNER) == _OWNER]
-
-    def forget(self) -> None:
-        """Anybody may be the owner from now on."""
-        self._known = []
+            if who == _OWNER:
+                continue
+            one = self._known[who]
+            one.person.see(sights[k], pose)
+            if not one.is_unsure and sights[k].off_m(one.first_ned) > _WALKS_M:
+                self.met_us = pose.time_us
+        known = {k for k, who in taken.items() if who != _OWNER and not self._known[who].is_unsure}
+        return [k for k in range(len(sights)) if k not in known]
 
     def heard(self, time_us: int) -> list[Suitor]:
         """Those who were seen lately, in order, and how well they fit the phone."""
@@ -130,6 +129,8 @@ class OtherPeople:
 
     def meet(self, sights: list[Sight], owner: Floats | None, pose: Pose) -> None:
         """Each of these is somebody new, but for what may be a part of the owner or of who is known."""
+        if owner is not None:  # who may have been the owner is
+            self._known = [one for one in self._known if not (one.is_unsure and _is_beside(one, owner, pose))]
         known = [one.person.now(pose.time_us)[0] for one in self._known]
         for sight in sights[: max(_MAX - len(self._known), 0)]:
             beside = [*known, *([owner] if owner is not None else [])]
@@ -138,3 +139,7 @@ class OtherPeople:
             one = _Known(SeenOwner(), pose.time_us, sight.place_ned, PhoneFit())
             one.person.see(sight, pose)
             self._known.append(one)
+
+
+def _is_beside(one: _Known, place: Floats, pose: Pose) -> bool:
+    return float(np.hypot(*(one.person.now(pose.time_us)[0] - place)[:2])) < _NEAR_M

@@ -211,18 +211,28 @@ class Senses:
             self._others.meet(new, None, pose)
             self._row = []
             return None
-        if silence_s > _STRANGE_S:  # or nobody was the owner before
-            self._others.forget()
-        gone_us = self.seen_us if is_gone else None
+        gone_us: float | None = self.seen_us if is_gone else None
+        if silence_s > _STRANGE_S:  # or nobody was the owner before: anybody may be
+            gone_us = -inf
         left = self._others.left(sights, None if is_gone else expected, alike, pose, gone_us)
         may_be = [k for k in left if alike[k] > UNLIKE]
         best = self._nearest(found, sights, may_be, expected, gate_m) if may_be else None
-        strangers = [sights[k] for k in left if k != best]
-        self._others.meet(strangers, None if best is None else sights[best].place_ned, pose)
-        if best is None:
+        is_doubted = is_gone or (best is not None and self._is_astray(found[best], sights[best], expected))
+        if best is None or not is_doubted:
             self._row = []
-            return None
-        return found[best] if not is_gone or self._is_there_to_stay(sights[best].place_ned) else None
+        is_owner = best is not None and (not is_doubted or self._is_there_to_stay(sights[best].place_ned))
+        is_met = is_gone and not is_owner  # who may be the owner is kept off, too
+        strangers = [sights[k] for k in left if k != best or is_met]
+        self._others.meet(strangers, None if best is None or is_met else sights[best].place_ned, pose)
+        return found[best] if best is not None and is_owner else None
+
+    @staticmethod
+    def _is_astray(one: Detection, sight: Sight, expected: Floats | None) -> bool:
+        """Whether somebody is so far from where the owner is expected that one image is not enough."""
+        if expected is None:
+            return False
+        near_m = _GATE_M if one.has_depth else _GATE_M + _COLOUR_GATE * float(np.hypot(*one.chest_hfrd[:2]))
+        return sight.off_m(expected) > near_m
 
     @staticmethod
     def _nearest(

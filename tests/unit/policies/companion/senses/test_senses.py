@@ -68,6 +68,36 @@ def test_a_single_ghost_does_not_bring_the_owner_back(scene: Scene) -> None:
     assert scene.silence_s == 0.0
 
 
+def test_a_single_ghost_far_from_where_the_owner_is_expected_is_not_the_owner(scene: Scene) -> None:
+    scene.look((3.0, 0.0), times=10)
+    scene.look(times=8)
+    scene.look((5.0, 1.5))
+    assert scene.silence_s > 0.8
+    scene.look((5.0, 1.5), times=3)
+    assert scene.silence_s == 0.0
+
+
+@pytest.mark.parametrize("seconds", [1.2, 6.0])
+def test_who_walks_about_while_nobody_knows_where_the_owner_is_is_kept_off_too(seconds: float) -> None:
+    scene = Scene(hears=False)
+    scene.look((3.0, 0.0), times=10)
+    scene.look(times=round(10.0 * seconds))
+    for k in range(8):
+        scene.look((20.0, 8.0 - 0.14 * k))
+    assert scene.silence_s > seconds
+    (one,) = scene.senses.others_now(scene.own)
+    assert one.pos_ned[:2] == pytest.approx([20.0, 7.0], abs=0.3)
+
+
+def test_who_turns_out_to_be_the_owner_is_nobody_else(scene: Scene) -> None:
+    scene.look((3.0, 0.0), times=10)
+    scene.look(times=12)
+    for k in range(10):
+        scene.look((4.0, 0.14 * k))
+    assert scene.silence_s == 0.0
+    assert not scene.senses.others_now(scene.own)
+
+
 def test_who_stands_beside_the_owner_is_somebody_else(scene: Scene) -> None:
     scene.look((3.0, 0.0), times=10)
     scene.look((3.0, 0.0), (2.0, 0.3), times=10)
