@@ -37,6 +37,7 @@ in held-out worlds: fresh hills, trees, owners, wind and noise, {episodes}.
 "Flown" are flights over MAVLink in lockstep: the whole autopilot, a companion computer, one vehicle at a time, without
 a guard. Of those from before all their seeds were odd, half are of the set that training draws from, by chance hardly
 the same. How the policies that ship do under the guard is on [another page](harder.md).
+Rows are of the first seed; how many seeds there are stands under [what training takes](#what-training-takes).
 Intervals are 95 % over episodes: Wilson's for rates, the bootstrap's for the rest. Measured on {machine}.
 
 Success, tracking and collision are EVT-Bench's with its ranges kept (scale 1). In the band is {near:g} to {far:g} m
@@ -44,6 +45,12 @@ from the owner's chest. Success (SR) is to be in it with the owner in view when 
 tracking (TR) is the share of time within {far:g} m with the owner in view; collision (CR) is an episode that touched a
 tree, a wall or the ground or came within {touch:g} m of the owner. What is left of an episode that ended early counts
 as not followed. A loss is {loss:g} s or more out of view or beyond {lost:g} m.
+"""
+
+
+NOT_RUN = """\
+"Not run" is what this command has not trained here. What ships of it was trained by the same recipes, three seeds, each
+stage by itself: [how, and how long that took](../../policies/pretrained/README.md#how-long-and-how-far-apart).
 """
 
 
@@ -94,6 +101,8 @@ def _summary(results: Results) -> str:
             lines.append(f"| {stage.title} | {stage.document} | not run | | | | | | | |")
             continue
         lines += _summary_rows(stage, runs[0])
+    if any(not results.get(name) for name in STAGES):
+        lines += ["", NOT_RUN]
     return "\n".join(lines) + "\n"
 
 
