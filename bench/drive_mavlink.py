@@ -201,6 +201,8 @@ def main(arguments: list[str]) -> int:
         seed, lag_s = int(changed.get("seed", SEED)), float(changed.get("lag", 0.0))
         policy, _ = load_policy(path)
         guard = GuardSettings() if "guard" in arguments else UNGUARDED
+        how = " ".join(word for word in WORDS if word in arguments) or "setpoints, no guard"
+        print(f"{preset}: {how}, seed {seed}, ranges {1000 * lag_s:.0f} ms late", flush=True)
         line = measured(
             preset,
             policy,

@@ -50,6 +50,7 @@ class OtherPeople:
 
     def __init__(self) -> None:
         self._known: list[_Known] = []
+        self._taken: list[Sight] = []  # of the newest image: of those whom it knows
         self.met_us: int | None = None
         """When one of them was seen last who walked: a trunk that the detector takes for somebody does not."""
 
@@ -95,6 +96,7 @@ class OtherPeople:
             if not one.is_unsure and sights[k].off_m(one.first_ned) > _WALKS_M:
                 self.met_us = pose.time_us
         known = {k for k, who in taken.items() if who != _OWNER and not self._known[who].is_unsure}
+        self._taken = [sights[k] for k, who in taken.items() if who != _OWNER]
         return [k for k in range(len(sights)) if k not in known]
 
     def heard(self, time_us: int) -> list[Suitor]:
@@ -132,9 +134,10 @@ class OtherPeople:
         if owner is not None:  # who may have been the owner is
             self._known = [one for one in self._known if not (one.is_unsure and _is_beside(one, owner, pose))]
         known = [one.person.now(pose.time_us)[0] for one in self._known]
-        for sight in sights[: max(_MAX - len(self._known), 0)]:
+        for sight in sights:
             beside = [*known, *([owner] if owner is not None else [])]
-            if any(sight.off_m(other) < _APART_M for other in beside):
+            is_known = any(sight is taken for taken in self._taken) or len(self._known) >= _MAX
+            if is_known or any(sight.off_m(other) < _APART_M for other in beside):
                 continue
             one = _Known(SeenOwner(), pose.time_us, sight.place_ned, PhoneFit())
             one.person.see(sight, pose)

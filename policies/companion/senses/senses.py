@@ -2,8 +2,8 @@
 
 In: images, telemetry, the phone's reports. Out: the owner's place and velocity by sights alone, the track of sights and
 phone together, since when the owner has not been seen, and a level map of what is solid. The owner is whom the
-detector sees where they are expected; after a while without them, only who is there in several images in a row, and
-where others were met lately only whom phone and looks say.
+detector sees where they are expected; farther off, and after a while without them, only who is there in several images
+in a row, and where others were met lately only whom phone and looks say.
 """
 
 from dataclasses import replace
@@ -39,7 +39,9 @@ _MET_US = 20_000_000  # so long ago somebody else was there not long ago
 _STRANGE_S = 4.0  # and after so long anybody may be them
 _NEW_US = 1_000_000  # after so long with somebody in sight they are the owner, if nobody was so before
 _IN_A_ROW = 4  # as many images must show them, one beside the other
+_IN_A_ROW_ASTRAY = 2  # or as many, who is in sight too far from where they are expected
 _BESIDE_M = 1.0
+_ROW_US = 350_000  # and with no more than this between two
 _RISEN_M = 1.0  # until it is so high the map would take the ground for solid,
 _DOWN_M = 0.6  # and again once it is as low as this, before the ground comes into the slice that it flies through
 
@@ -76,7 +78,7 @@ class Senses:
         """When the newest image was taken."""
         self.heard_us: int | None = None
         self._first_us: int | None = None  # when the first image with somebody in it was taken
-        self._row: list[Floats] = []  # where who may be the owner was in the last images
+        self._row: list[tuple[int, Floats]] = []  # when and where who may be the owner was in the last images
         self._others = OtherPeople()
         self._phone = PhoneCheck()
         self._fit = PhoneFit()  # of who is taken for the owner
@@ -217,10 +219,14 @@ class Senses:
         left = self._others.left(sights, None if is_gone else expected, alike, pose, gone_us)
         may_be = [k for k in left if alike[k] > UNLIKE]
         best = self._nearest(found, sights, may_be, expected, gate_m) if may_be else None
-        is_doubted = is_gone or (best is not None and self._is_astray(found[best], sights[best], expected))
-        if best is None or not is_doubted:
+        is_astray = best is None or self._is_astray(found[best], sights[best], expected)
+        if is_astray and not is_gone:
+            in_row = self._next_in_row(sights, may_be, pose.time_us)
+            best = best if in_row is None else in_row
+        asked = _IN_A_ROW if is_gone else _IN_A_ROW_ASTRAY if is_astray else 1
+        is_owner = best is not None and self._is_there_to_stay(sights[best].place_ned, pose.time_us, asked)
+        if best is None:
             self._row = []
-        is_owner = best is not None and (not is_doubted or self._is_there_to_stay(sights[best].place_ned))
         is_met = is_gone and not is_owner  # who may be the owner is kept off, too
         strangers = [sights[k] for k in left if k != best or is_met]
         self._others.meet(strangers, None if best is None or is_met else sights[best].place_ned, pose)
@@ -251,7 +257,7 @@ class Senses:
         if self._first_us is None:
             self._first_us = time_us
         gate_m = min(_GATE_M + _GATE_M_S * silence_s, _GATE_MAX_M)
-        if silence_s < _GONE_S:
+        if silence_s <= _GONE_S:
             return self.seen.now(time_us)[0], gate_m
         if not self.is_heard and self.seen.sights:  # nobody says where they have gone since: as far as they could
             return self.seen.now(time_us)[0], _GATE_M + _GATE_M_S * silence_s
@@ -266,12 +272,22 @@ class Senses:
         expected = track.pos_ned + (time_us - track.time_us) * 1e-6 * track.vel_ned
         return expected, max(gate_m, _PHONE_GATE_M, min(doubt_m, 3.0 * _PHONE_GATE_M))
 
-    def _is_there_to_stay(self, place: Floats) -> bool:
-        """Whether somebody was there in enough images in a row, this one included."""
-        if self._row and float(np.hypot(*(place - self._row[-1])[:2])) > _BESIDE_M:
-            self._row = []
-        self._row = [*self._row[-(_IN_A_ROW - 1) :], place]
-        return len(self._row) >= _IN_A_ROW
+    def _next_in_row(self, sights: list[Sight], may_be: list[int], time_us: int) -> int | None:
+        """Who of some stands where who may be the owner was in the image before."""
+        if not self._row or time_us - self._row[-1][0] > _ROW_US:
+            return None
+        off_m = {k: sights[k].off_m(self._row[-1][1]) for k in may_be}
+        best = min(may_be, key=off_m.__getitem__, default=None)
+        return best if best is not None and off_m[best] <= _BESIDE_M else None
+
+    def _is_there_to_stay(self, place: Floats, time_us: int, images: int) -> bool:
+        """Whether somebody was there in so many images in a row, this one included."""
+        if self._row:
+            last_us, last = self._row[-1]
+            if time_us - last_us > _ROW_US or float(np.hypot(*(place - last)[:2])) > _BESIDE_M:
+                self._row = []
+        self._row = [*self._row[-(_IN_A_ROW - 1) :], (time_us, place)]
+        return len(self._row) >= images
 
 
 def _sight(detection: Detection, pose: Pose) -> Sight:

@@ -73,8 +73,36 @@ def test_a_single_ghost_far_from_where_the_owner_is_expected_is_not_the_owner(sc
     scene.look(times=8)
     scene.look((5.0, 1.5))
     assert scene.silence_s > 0.8
-    scene.look((5.0, 1.5), times=3)
+    scene.look(times=1)
+    scene.look((5.0, 1.5))
+    assert scene.silence_s > 1.0
+
+
+@pytest.mark.parametrize("hears", [True, False])
+@pytest.mark.parametrize(("speed", "hidden"), [(2.0, 4), (2.0, 7), (3.0, 4)])
+def test_an_owner_who_turns_out_of_sight_is_followed_from_the_second_image_on(
+    hears: bool, speed: float, hidden: int
+) -> None:
+    scene = Scene(hears=hears)
+    for k in range(10):
+        if k % 5 == 0:
+            scene.report(6.0 + 0.1 * speed * k, 0.0)
+        scene.look((6.0 + 0.1 * speed * k, 0.0))
+    corner = 6.0 + 0.9 * speed
+    scene.look(times=hidden)
+    for k in range(2):
+        scene.look((corner, 0.1 * speed * (hidden + 1 + k)))
     assert scene.silence_s == 0.0
+
+
+def test_a_fourth_who_comes_while_the_owner_is_gone_is_kept_off_beside_three_who_are_known() -> None:
+    scene = Scene(hears=False)
+    scene.look((3.0, 0.0), times=10)
+    scene.look(times=12)
+    walkers = [(20.0, -4.0), (20.0, 0.0), (20.0, 4.0)]
+    for k in range(16):
+        scene.look(*((x, y + 0.1 * k) for x, y in [*walkers, (16.0, 8.0)][: 3 if k < 6 else 4]))
+    assert len(scene.senses.others_now(scene.own)) == 4
 
 
 @pytest.mark.parametrize("seconds", [1.2, 6.0])
