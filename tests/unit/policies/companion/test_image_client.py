@@ -2,6 +2,7 @@
 
 import socket
 import time
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -65,7 +66,9 @@ def test_other_addresses_are_refused(url):
         StreamCamera(url)
 
 
-def test_a_camera_that_falls_silent_without_a_goodbye_is_looked_for_again():
+@contextmanager
+def streaming():
+    """A server, a camera that has taken a first frame from it, and their connection."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         camera = StreamCamera(f"tcp://127.0.0.1:{server.getsockname()[1]}")
         camera.take(0)
@@ -73,32 +76,30 @@ def test_a_camera_that_falls_silent_without_a_goodbye_is_looked_for_again():
         with first:
             first.sendall(frame_bytes(frame(1)))
             assert taken(camera, 100_000).sequence == 1
-            camera.take(100_000 + SILENT_US)
-            assert camera.trouble == ""
-            camera.take(200_000 + SILENT_US)
-            assert camera.trouble == "the camera is silent"
-            camera.take(10 * SILENT_US)
-            second, _ = server.accept()
+            yield server, camera, first
+        camera.close()
+
+
+def test_a_camera_that_falls_silent_without_a_goodbye_is_looked_for_again():
+    with streaming() as (server, camera, _):
+        camera.take(100_000 + SILENT_US)
+        assert camera.trouble == ""
+        camera.take(200_000 + SILENT_US)
+        assert camera.trouble == "the camera is silent"
+        camera.take(10 * SILENT_US)
+        second, _ = server.accept()
         with second:
             slow_us = 10 * SILENT_US + FIRST_US
             assert camera.take(slow_us) is None
             second.sendall(frame_bytes(frame(2)))  # of a camera that begins with a connection what takes long
             assert taken(camera, slow_us).sequence == 2
-        camera.close()
 
 
 def test_a_stream_of_another_encoding_gives_no_pictures_and_says_why():
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        camera = StreamCamera(f"tcp://127.0.0.1:{server.getsockname()[1]}")
-        camera.take(0)
-        first, _ = server.accept()
-        with first:
-            first.sendall(frame_bytes(frame(1)))
-            assert taken(camera, 100_000).sequence == 1
-            first.sendall(b"\xff\xd8\xff\xe0 a JPEG" + bytes(200))
-            assert taken(camera, 200_000) is None
-            assert "first bytes" in camera.trouble
-        camera.close()
+    with streaming() as (_, camera, connection):
+        connection.sendall(b"\xff\xd8\xff\xe0 a JPEG" + bytes(200))
+        assert taken(camera, 200_000) is None
+        assert "first bytes" in camera.trouble
 
 
 def taken(camera, time_us):
