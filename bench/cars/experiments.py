@@ -66,7 +66,7 @@ REACH_CURVES = tuple(
         f"reach-{variant.lower()}-{width}",
         f"{variant}, {network}",
         f"reach-target-document{'' if width == 512 else '-small'}",
-        seeds=1 if width == 512 else 3,
+        seeds=1 if width == 512 else 5,
         settings={"variant": k},
         document=_REPORTED[k],
     )
@@ -219,7 +219,7 @@ SECTIONS: tuple[Section, ...] = (
             ),
             Image(
                 "reach-target-128",
-                "Reach target, a smaller network (2 x 128), mean of three seeds",
+                "Reach target, a smaller network (2 x 128), mean of five seeds",
                 {variant: f"reach-{variant.lower()}-128" for variant in VARIANTS},
                 value="reward",
                 over="steps",
