@@ -237,8 +237,7 @@ class Senses:
         """Whether somebody is so far from where the owner is expected that one image is not enough."""
         if expected is None:
             return False
-        near_m = _GATE_M if one.has_depth else _GATE_M + _COLOUR_GATE * float(np.hypot(*one.chest_hfrd[:2]))
-        return sight.off_m(expected) > near_m
+        return sight.off_m(expected) > _widened(_GATE_M, one)
 
     @staticmethod
     def _nearest(
@@ -248,9 +247,7 @@ class Senses:
         far_m = {k: float(np.hypot(*found[k].chest_hfrd[:2])) for k in may_be}
         off_m = far_m if expected is None else {k: sights[k].off_m(expected) for k in may_be}
         best = min(may_be, key=off_m.__getitem__)
-        if not found[best].has_depth:
-            gate_m += _COLOUR_GATE * far_m[best]
-        return best if expected is None or off_m[best] <= gate_m else None
+        return best if expected is None or off_m[best] <= _widened(gate_m, found[best]) else None
 
     def _expected(self, time_us: int, silence_s: float) -> tuple[Floats | None, float]:
         """Where the owner is expected in an image, and how far off they may be; who was never seen may be anywhere."""
@@ -272,22 +269,29 @@ class Senses:
         expected = track.pos_ned + (time_us - track.time_us) * 1e-6 * track.vel_ned
         return expected, max(gate_m, _PHONE_GATE_M, min(doubt_m, 3.0 * _PHONE_GATE_M))
 
+    def _is_next(self, place: Floats, time_us: int) -> bool:
+        """Whether who is in a place may be who was in the row's last image."""
+        if not self._row:
+            return False
+        last_us, last = self._row[-1]
+        return time_us - last_us <= _ROW_US and float(np.hypot(*(place - last)[:2])) <= _BESIDE_M
+
     def _next_in_row(self, sights: list[Sight], may_be: list[int], time_us: int) -> int | None:
-        """Who of some stands where who may be the owner was in the image before."""
-        if not self._row or time_us - self._row[-1][0] > _ROW_US:
-            return None
-        off_m = {k: sights[k].off_m(self._row[-1][1]) for k in may_be}
-        best = min(may_be, key=off_m.__getitem__, default=None)
-        return best if best is not None and off_m[best] <= _BESIDE_M else None
+        """Who of some stands nearest to where who may be the owner was in the image before, if near enough."""
+        nexts = [k for k in may_be if self._is_next(sights[k].place_ned, time_us)]
+        return min(nexts, key=lambda k: sights[k].off_m(self._row[-1][1]), default=None)
 
     def _is_there_to_stay(self, place: Floats, time_us: int, images: int) -> bool:
         """Whether somebody was there in so many images in a row, this one included."""
-        if self._row:
-            last_us, last = self._row[-1]
-            if time_us - last_us > _ROW_US or float(np.hypot(*(place - last)[:2])) > _BESIDE_M:
-                self._row = []
+        if not self._is_next(place, time_us):
+            self._row = []
         self._row = [*self._row[-(_IN_A_ROW - 1) :], (time_us, place)]
         return len(self._row) >= images
+
+
+def _widened(gate_m: float, one: Detection) -> float:
+    """How far off somebody may be, their range told from colours alone or measured."""
+    return gate_m if one.has_depth else gate_m + _COLOUR_GATE * float(np.hypot(*one.chest_hfrd[:2]))
 
 
 def _sight(detection: Detection, pose: Pose) -> Sight:
