@@ -23,7 +23,7 @@ RANGES = SECTORS + 4
 RANGE_M = wp.constant(8.0)  # no more than a bucket of the forest, so that its neighbours hold every tree within
 _SECTORS = wp.constant(SECTORS)
 _SECTOR_RAD = wp.constant(2.0 * math.pi / SECTORS)
-_HULL_M = wp.constant(0.35)  # a crown that begins this much higher or lower counts: half a vehicle's height and more
+HULL_M = wp.constant(0.35)  # a crown that begins this much higher or lower counts: half a vehicle's height and more
 
 RANGE_ELEMENTS = (
     *(Element(f"nearness_{15 * k}_deg", "1") for k in range(SECTORS)),
@@ -46,7 +46,7 @@ def width_at(tree: Tree, height: float) -> float:
     radius = float(0.0)
     if height < tree.crown_low:
         radius = tree.trunk_radius
-    nearest = wp.clamp(wp.clamp(height, tree.crown_low, tree.crown_high), height - _HULL_M, height + _HULL_M)
+    nearest = wp.clamp(wp.clamp(height, tree.crown_low, tree.crown_high), height - HULL_M, height + HULL_M)
     off = nearest - wp.clamp(nearest, tree.crown_low, tree.crown_high)
     spare = tree.crown_radius * tree.crown_radius - off * off
     if spare > 0.0:
@@ -55,16 +55,13 @@ def width_at(tree: Tree, height: float) -> float:
 
 
 @wp.func
-def add_tree(tree: Tree, pos_ned: wp.vec3, yaw: float, out: wp.array2d(dtype=float), i: int) -> None:
-    """Marks the sectors that a tree fills."""
-    north = tree.north - pos_ned[0]
-    east = tree.east - pos_ned[1]
-    distance = wp.sqrt(north * north + east * east)
-    radius = width_at(tree, -pos_ned[2])
+def mark_round(way: wp.vec2, radius: float, yaw: float, out: wp.array2d(dtype=float), i: int) -> None:
+    """Marks the sectors that something round fills, its middle so far north and east [m]."""
+    distance = wp.length(way)
     near = nearness(wp.max(distance - radius, 0.0))
-    if radius <= 0.0 or near <= 0.0:
+    if near <= 0.0:
         return
-    bearing = wrap_pi(wp.atan2(east, north) - yaw)
+    bearing = wrap_pi(wp.atan2(way[1], way[0]) - yaw)
     half = wp.asin(wp.min(radius / wp.max(distance, 1.0e-3), 1.0))
     first = int(wp.round((bearing - half) / _SECTOR_RAD))
     last = int(wp.round((bearing + half) / _SECTOR_RAD))
@@ -88,7 +85,10 @@ def add_trees(w: World, pos_ned: wp.vec3, yaw: float, out: wp.array2d(dtype=floa
         for c in range(wp.max(column - 1, 0), wp.min(column + 2, forest.buckets)):
             bucket = r * forest.buckets + c
             for k in range(forest.bucket_start[bucket], forest.bucket_start[bucket + 1]):
-                add_tree(forest.trees[forest.bucket_trees[k]], pos_ned, yaw, out, i)
+                tree = forest.trees[forest.bucket_trees[k]]
+                radius = width_at(tree, -pos_ned[2])
+                if radius > 0.0:
+                    mark_round(wp.vec2(tree.north - pos_ned[0], tree.east - pos_ned[1]), radius, yaw, out, i)
 
 
 @wp.kernel(enable_backward=False)

@@ -51,6 +51,7 @@ from policies.tasks.follow_me.observe import (
     TRACKED,
     vector_elements,
 )
+from policies.tasks.follow_me.others import mark_others
 from policies.tasks.follow_me.owner_visibility import Sight
 from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS
 from policies.tasks.follow_me.settings import FollowSettings
@@ -120,6 +121,7 @@ class FollowMe(FlightTask):
         self._look_all.launch()
         if self._sees_truth:
             self._measure_all.launch()
+            self._mark_all.launch()
         if self._eyes is not None:
             self._eyes.take()
         if self._is_tracked:
@@ -136,6 +138,7 @@ class FollowMe(FlightTask):
         self._look_starting.launch()
         if self._sees_truth:
             self._measure_starting.launch()
+            self._mark_starting.launch()
         if self._eyes is not None:
             self._eyes.refresh(self.is_growing)
             self._eyes.take(self.is_starting)
@@ -220,6 +223,7 @@ class FollowMe(FlightTask):
         self._walk = record(walk, buffers, rules, rig, state)
         self._look_all = record(look, rig, state, state.is_all)
         self._measure_all = record(measure_ranges, rig, state.is_all, state.nearness)
+        self._mark_all = record(mark_others, rig, state.bystanders, state.is_all, state.nearness)
         if self._is_tracked:
             seen = [state.params, state.sights, state.drawn, state.nearness, state.path_seeds]
             way, everyone = self._sight_way, state.is_all
@@ -230,6 +234,7 @@ class FollowMe(FlightTask):
         self._place = record(place, buffers, rig, state, start)
         self._look_starting = record(look, rig, state, self.is_starting)
         self._measure_starting = record(measure_ranges, rig, self.is_starting, state.nearness)
+        self._mark_starting = record(mark_others, rig, state.bystanders, self.is_starting, state.nearness)
         self._show = record(show, buffers, rules, rig, state, start)
 
 

@@ -36,6 +36,7 @@ from policies.tasks.follow_me.cast import (
 )
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.observe import REPORT_OLD_S, TRACKED, OwnerReport, document_action, write_vector
+from policies.tasks.follow_me.others import kept_from_others, room_between
 from policies.tasks.follow_me.owner_visibility import Sight, lens_in, reach_from, see
 from policies.tasks.follow_me.privileged import write_privileged
 from policies.tasks.follow_me.reward import document_reward, follow_outcome, follow_reward, is_in_band
@@ -68,7 +69,7 @@ MEASURES = (
 )  # fmt: skip
 """Of each decision, the simulator's truth: distance to the owner's chest, its bearing from the true heading, whether
 the image shows some of the owner, whether anything was touched or the owner came too near, whether the distance is in
-the band, room to obstacles (at most 2 m), and both speeds."""
+the band, room to obstacles and others (at most 2 m), and both speeds."""
 
 
 @wp.struct
@@ -173,7 +174,10 @@ def look(rig: RigArrays, state: FollowState, rows: wp.array(dtype=wp.bool)) -> N
     if rows[i]:
         truth = rig.truth[i]
         params = state.params[i]
-        state.sights[i] = see(rig.worlds[rig.i_world[i]], truth, params, state.people[i], state.drawn[i, 0])
+        sight = see(rig.worlds[rig.i_world[i]], truth, params, state.people[i], state.drawn[i, 0])
+        for k in range(BYSTANDERS_MAX):
+            sight.room_m = wp.min(sight.room_m, room_between(truth.pos_ned, state.bystanders[i, k]))
+        state.sights[i] = sight
         state.lenses[i] = lens_in(truth, params)
 
 
@@ -220,6 +224,8 @@ def asked(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState
     if state.params[i].guard == 1.0:
         own = own_state(rig, i, rules.has_estimator)
         command = guarded(command, own, state.tracked.filters[i], rules.keep_off)
+        age_s = state.image_ages_s[i]
+        command = kept_from_others(command, own, rig.truth[i], state.bystanders, age_s, rules.keep_off, i)
     state.tracked.before[i] = state.tracked.commands[i]
     state.tracked.commands[i] = command
     return command

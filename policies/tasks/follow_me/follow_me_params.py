@@ -235,7 +235,7 @@ SEEN_BY_TRACKER: dict[str, float | Sampler] = {
     "owner_course_std_deg": Sampler(intervals=((40.0, 70.0), (40.0, 70.0), (60.0, 120.0))),
     "owner_hides_per_min": Sampler(mean=0.2, st_dev=1.5),
     "owner_hide_s": Sampler(intervals=((0.3, 1.9),)),
-    "bystanders": Sampler(intervals=((0.0, 0.4), (0.0, 0.4), (0.5, 3.0))),  # one to three of them in a third
+    "bystanders": Sampler(mean=0.5, st_dev=1.5),  # one to three of them in half of the episodes
     "start_distance_min_m": 1.5,
     "start_distance_max_m": Sampler(intervals=((3.0, 5.0), (3.0, 8.0))),
     "image_lag_s": Sampler(intervals=((0.0, 0.1), (0.0, 0.35))),

@@ -1,7 +1,7 @@
-"""What the guard makes of what a policy asks for, as far as it goes by the owner: the part that training has too.
+"""What the guard makes of what a policy asks for, as far as it goes by people: the part that training has too.
 
-In: the velocity asked for, the vehicle's own state, the owner's filter. Out: what is flown. What the
-guard does about trees it does by a map, which training has not.
+In: the velocity asked for, the vehicle's own state, the owner's filter. Out: what is flown. What the guard does about
+trees it does by a map, which training has not.
 """
 
 import warp as wp
@@ -16,15 +16,23 @@ _SLOW_S, _STOP_S = wp.constant(SLOW_S), wp.constant(STOP_S)
 
 
 @wp.func
+def kept_from(
+    command: Command, own: OwnState, way: wp.vec3, vel: wp.vec2, vel_std: float, age_s: float, k: KeepOff
+) -> Command:
+    """What is flown of a command near somebody whose chest lies that way [m], seen so long ago."""
+    level_way = wp.vec2(way[0], way[1])
+    b = bounds(k, level_way, own.vel_ned, vel, vel_std, age_s, way[2])
+    level = kept_off(wp.vec2(command.vel_ned[0], command.vel_ned[1]), level_way, b.closing_max)
+    command.vel_ned = wp.vec3(level[0], level[1], wp.min(command.vel_ned[2], b.sinking_max))
+    return command
+
+
+@wp.func
 def guarded(command: Command, own: OwnState, owner: OwnerFilter, k: KeepOff) -> Command:
     """What is flown of a command."""
     if owner.is_known == 0:
         return command
-    scale = wp.clamp((_STOP_S - owner.age_s) / (_STOP_S - _SLOW_S), 0.0, 1.0)
-    place = place_now(owner)
-    way = wp.vec2(place[0] - own.pos_ned[0], place[1] - own.pos_ned[1])
-    over_m = place[2] - own.pos_ned[2]
-    b = bounds(k, way, own.vel_ned, velocity_now(owner), std_along(owner.both.vel_var, way), owner.age_s, over_m)
-    level = kept_off(scale * wp.vec2(command.vel_ned[0], command.vel_ned[1]), way, b.closing_max)
-    command.vel_ned = wp.vec3(level[0], level[1], wp.min(scale * command.vel_ned[2], b.sinking_max))
-    return command
+    command.vel_ned = wp.clamp((_STOP_S - owner.age_s) / (_STOP_S - _SLOW_S), 0.0, 1.0) * command.vel_ned
+    way = place_now(owner) - own.pos_ned
+    std = std_along(owner.both.vel_var, wp.vec2(way[0], way[1]))
+    return kept_from(command, own, way, velocity_now(owner), std, owner.age_s, k)
