@@ -29,7 +29,7 @@ RANGE_ELEMENTS = (
     *(Element(f"nearness_{15 * k}_deg", "1") for k in range(SECTORS)),
     Element("nearness_up", "1"),
     Element("nearness_down", "1"),
-    Element("nearest_tree_ahead", "1"),  # unit vector to the tree times its nearness
+    Element("nearest_tree_ahead", "1"),  # unit vector to the tree, or to another person, times its nearness
     Element("nearest_tree_right", "1"),
 )
 
@@ -55,7 +55,7 @@ def width_at(tree: Tree, height: float) -> float:
 
 
 @wp.func
-def mark_round(way: wp.vec2, radius: float, yaw: float, out: wp.array2d(dtype=float), i: int) -> None:
+def mark_sectors(way: wp.vec2, radius: float, yaw: float, out: wp.array2d(dtype=float), i: int) -> None:
     """Marks the sectors that something round fills, its middle so far north and east [m]."""
     distance = wp.length(way)
     near = nearness(wp.max(distance - radius, 0.0))
@@ -68,6 +68,14 @@ def mark_round(way: wp.vec2, radius: float, yaw: float, out: wp.array2d(dtype=fl
     for k in range(first, last + 1):
         sector = (k + _SECTORS) % _SECTORS
         out[i, sector] = wp.max(out[i, sector], near)
+
+
+@wp.func
+def mark_round(way: wp.vec2, radius: float, yaw: float, out: wp.array2d(dtype=float), i: int) -> None:
+    """Marks something round in all of `RANGE_ELEMENTS`: its sectors, and whether it is the nearest."""
+    mark_sectors(way, radius, yaw, out, i)
+    near = nearness(wp.max(wp.length(way) - radius, 0.0))
+    bearing = wp.atan2(way[1], way[0]) - yaw
     ahead = out[i, _SECTORS + 2]
     right = out[i, _SECTORS + 3]
     if near * near > ahead * ahead + right * right:

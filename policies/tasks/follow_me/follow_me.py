@@ -51,7 +51,7 @@ from policies.tasks.follow_me.observe import (
     TRACKED,
     vector_elements,
 )
-from policies.tasks.follow_me.others import mark_others
+from policies.tasks.follow_me.others import mark_others, see_others
 from policies.tasks.follow_me.owner_visibility import Sight
 from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS
 from policies.tasks.follow_me.settings import FollowSettings
@@ -121,11 +121,12 @@ class FollowMe(FlightTask):
         self._look_all.launch()
         if self._sees_truth:
             self._measure_all.launch()
-            self._mark_all.launch()
         if self._eyes is not None:
             self._eyes.take()
         if self._is_tracked:
             self._sense(self.follow.is_all)
+        if self._sees_truth:
+            self._mark_all.launch()
         self._judge.launch()
         self.keep_last_images()
         self._begin_rows()
@@ -138,12 +139,13 @@ class FollowMe(FlightTask):
         self._look_starting.launch()
         if self._sees_truth:
             self._measure_starting.launch()
-            self._mark_starting.launch()
         if self._eyes is not None:
             self._eyes.refresh(self.is_growing)
             self._eyes.take(self.is_starting)
         if self._is_tracked:
             self._sense(self.is_starting, is_first=True)
+        if self._sees_truth:
+            self._mark_starting.launch()
         self._show.launch()
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
@@ -154,7 +156,7 @@ class FollowMe(FlightTask):
 
     def _sense(self, rows: Any, *, is_first: bool = False) -> None:
         """Draws the sights of new pictures, of the chosen rows, and takes in those that have come."""
-        for launch, first, chosen in ((self._note, 2, 3), (self._sense_rows, 9, 10)):
+        for launch, first, chosen in ((self._note, 2, 3), (self._sense_rows, 9, 10), (self._see_others, 4, 5)):
             launch.set_param_at_index(first, int(is_first))
             launch.set_param_at_index(chosen, rows)
             launch.launch()
@@ -223,18 +225,19 @@ class FollowMe(FlightTask):
         self._walk = record(walk, buffers, rules, rig, state)
         self._look_all = record(look, rig, state, state.is_all)
         self._measure_all = record(measure_ranges, rig, state.is_all, state.nearness)
-        self._mark_all = record(mark_others, rig, state.bystanders, state.is_all, state.nearness)
+        self._mark_all = record(mark_others, rig, state.drawn, state.is_all, state.nearness)
         if self._is_tracked:
             seen = [state.params, state.sights, state.drawn, state.nearness, state.path_seeds]
             way, everyone = self._sight_way, state.is_all
             self._note = record(note, state.params, state.path_seeds, 0, everyone, way)
             self._sense_rows = record(sense, rig, rules.has_estimator, *seen, way, state.tracked, 0, everyone)
+            self._see_others = record(see_others, rig, state.params, state.drawn, state.tracked, 0, everyone)
         self._judge = record(judge, buffers, rules, rig, state, start)
         self._prepare = record(prepare, buffers, rules, state, start)
         self._place = record(place, buffers, rig, state, start)
         self._look_starting = record(look, rig, state, self.is_starting)
         self._measure_starting = record(measure_ranges, rig, self.is_starting, state.nearness)
-        self._mark_starting = record(mark_others, rig, state.bystanders, self.is_starting, state.nearness)
+        self._mark_starting = record(mark_others, rig, state.drawn, self.is_starting, state.nearness)
         self._show = record(show, buffers, rules, rig, state, start)
 
 

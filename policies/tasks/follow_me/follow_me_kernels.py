@@ -225,7 +225,8 @@ def asked(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState
         own = own_state(rig, i, rules.has_estimator)
         command = guarded(command, own, state.tracked.filters[i], rules.keep_off)
         age_s = state.image_ages_s[i]
-        command = kept_from_others(command, own, rig.truth[i], state.bystanders, age_s, rules.keep_off, i)
+        people, tracked = state.drawn, state.tracked
+        command = kept_from_others(command, own, rig.truth[i], people, tracked, age_s, rules.keep_off, i)
     state.tracked.before[i] = state.tracked.commands[i]
     state.tracked.commands[i] = command
     return command

@@ -15,6 +15,7 @@ from common.rng import draw_key
 from common.rotation import yaw_from_quat
 from policies.tasks.flight.flown_vehicle import own_state
 from policies.tasks.flight.own_state import Command, ned_from_level
+from policies.tasks.follow_me.cast import PEOPLE_MAX
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.image_way import Way
 from policies.tasks.follow_me.observe import TILT_DEG
@@ -26,6 +27,7 @@ from sim.world.people import Person
 
 wp.set_module_options({"enable_backward": False})
 
+OTHERS = PEOPLE_MAX - 1
 KEPT = wp.constant(10)  # sights on their way, as of pictures
 _SECTORS = wp.constant(SECTORS)
 _SECTOR_RAD = wp.constant(6.2831853 / float(SECTORS))
@@ -49,9 +51,10 @@ _STOLEN_M = wp.constant(0.9)  # so near the owner somebody else may be taken for
 _STOLEN = wp.constant(0.3)
 _HIDES_M = wp.constant(0.35)  # beside the line of sight somebody else hides them
 _HOLD = wp.constant(60)  # decisions for which a map remembers
-_HALF_VIEW_RAD = wp.constant(0.72)
+HALF_VIEW_RAD = wp.constant(0.72)
 _FORGETS = wp.constant(0.983)  # of the way flown, a decision: what six seconds' map is good for
 _MAP_STD_M = wp.constant(0.12)
+_MAP_COLOUR_STD = wp.constant(0.08)  # of the range, by colours: `policies.mono_depth.training --judge`
 
 
 @wp.struct
@@ -68,7 +71,9 @@ class Tracked:
     looked: wp.array2d(dtype=int)  # (envs, SECTORS) pictures since each direction of the world was looked at
     travelled_m: wp.array(dtype=float)
     nearness: wp.array2d(dtype=float)  # (envs, SECTORS) as a map knows it
-    has_depth: wp.array(dtype=int)
+    has_depth: wp.array(dtype=int)  # it is measured, not told from colours
+    others_ned: wp.array2d(dtype=wp.vec3)  # (envs, others) where images showed them last
+    others_age_s: wp.array2d(dtype=float)  # since then
 
 
 def make_tracked(zeros: Callable[[str, Any, Any], Any], count: int) -> Any:
@@ -85,6 +90,8 @@ def make_tracked(zeros: Callable[[str, Any, Any], Any], count: int) -> Any:
     tracked.travelled_m = zeros("travelled", count, float)
     tracked.nearness = zeros("mapped_nearness", (count, SECTORS), float)
     tracked.has_depth = zeros("has_depth", count, int)
+    tracked.others_ned = zeros("others_ned", (count, OTHERS), wp.vec3)
+    tracked.others_age_s = zeros("others_age", (count, OTHERS), float)
     return tracked
 
 
@@ -102,6 +109,12 @@ def is_covered(eye_ned: wp.vec3, chest_ned: wp.vec3, other: Person) -> bool:
 
 
 @wp.func
+def has_depth(n: FollowParams) -> bool:
+    """Whether an episode's images have depth anywhere."""
+    return n.depth_max_m > 1.0
+
+
+@wp.func
 def miss_chance(n: FollowParams, distance_m: float) -> float:
     """That a picture of the owner shows nobody."""
     chance = _MISS + _MISS_PER_M * wp.max(distance_m - _MISS_FAR_M, 0.0)
@@ -113,7 +126,7 @@ def miss_chance(n: FollowParams, distance_m: float) -> float:
 
 @wp.func
 def sight_drawn(
-    n: FollowParams, sight: Sight, yaw: float, own_ned: wp.vec3, has_depth: int, seed: int, i: int, k: int
+    n: FollowParams, sight: Sight, yaw: float, own_ned: wp.vec3, is_measured: int, seed: int, i: int, k: int
 ) -> wp.vec3:
     """Where picture k shows the owner's chest."""
     state = draw_key(seed, i, k, _STREAM)
@@ -123,7 +136,7 @@ def sight_drawn(
     noise = n.camera_noise
     along = _ALONG_BIAS_M * wp.randn(fixed) + noise * (_ALONG_M + _ALONG_FRACTION * level_m) * wp.randn(state)
     bias = _COLOUR_BIAS * wp.randn(fixed)
-    if has_depth == 0:
+    if is_measured == 0:
         along = level_m * (bias + noise * _COLOUR_FRACTION * wp.randn(state))
     aside = level_m * (_ACROSS_BIAS_RAD * wp.randn(fixed) + noise * _ACROSS_RAD * wp.randn(state))
     down = _DOWN_BIAS_M * wp.randn(fixed) + _DOWN_M * wp.randn(state)
@@ -149,24 +162,24 @@ def sight_drawn(
 def map_known(
     n: FollowParams, tracked: Tracked, nearness: wp.array2d(dtype=float), yaw: float, seed: int, i: int, k: int
 ) -> None:
-    """What the map of depth knows of how near things are."""
+    """What the map knows of how near things are: by depth, or by colours if there is none."""
     state = draw_key(seed, i, k, _STREAM + 1)
-    has_depth = int(n.depth_max_m > 1.0)
-    tracked.has_depth[i] = has_depth
+    tracked.has_depth[i] = int(has_depth(n))
+    reach_m = wp.where(has_depth(n), n.depth_max_m, REACH_M)
     for j in range(_SECTORS):
         off = wp.abs(float(j) * _SECTOR_RAD - yaw)
         off = wp.min(off, wp.abs(6.2831853 - off))
         off = wp.min(off, wp.abs(off - 6.2831853))
-        tracked.looked[i, j] = wp.where(off < _HALF_VIEW_RAD and has_depth == 1, 0, tracked.looked[i, j] + 1)
+        tracked.looked[i, j] = wp.where(off < HALF_VIEW_RAD, 0, tracked.looked[i, j] + 1)
     turn = int(wp.round(yaw / _SECTOR_RAD))
     for j in range(_SECTORS):
         near = nearness[i, j]
         far_m = REACH_M * (1.0 - near)
         absolute = ((j + turn) % _SECTORS + _SECTORS) % _SECTORS
         is_known = tracked.looked[i, absolute] < _HOLD or far_m < 0.6 * tracked.travelled_m[i]
-        noise = _MAP_STD_M / REACH_M * wp.randn(state)
-        known = wp.where(is_known and near > 0.0 and far_m < n.depth_max_m and has_depth == 1, 1.0, 0.0)
-        tracked.nearness[i, j] = known * wp.clamp(near + noise, 0.0, 1.0)
+        std_m = wp.where(has_depth(n), _MAP_STD_M, _MAP_COLOUR_STD * far_m)
+        known = wp.where(is_known and near > 0.0 and far_m < reach_m, 1.0, 0.0)
+        tracked.nearness[i, j] = known * wp.clamp(near + std_m / REACH_M * wp.randn(state), 0.0, 1.0)
 
 
 @wp.kernel(enable_backward=False)
@@ -230,8 +243,8 @@ def take(
     state = draw_key(seed, i, k, _STREAM + 2)
     chest_ned = own_ned + ned_from_level(sight.position_hfrd, yaw)
     is_seen = sight.is_in_view == 1 and wp.randf(state) >= miss_chance(n, sight.distance_m)
-    has_depth = int(sight.distance_m < n.depth_max_m and wp.randf(state) >= n.depth_holes)
-    place = sight_drawn(n, sight, yaw, own_ned, has_depth, seed, i, k)
+    is_measured = int(sight.distance_m < n.depth_max_m and wp.randf(state) >= n.depth_holes)
+    place = sight_drawn(n, sight, yaw, own_ned, is_measured, seed, i, k)
     for j in range(1, drawn.shape[1]):
         other = drawn[i, j]
         if is_covered(own_ned, chest_ned, other):
@@ -241,4 +254,4 @@ def take(
             place = place + wp.vec3(off[0], off[1], 0.0)
     tracked.sights_ned[i, slot] = place
     tracked.eyes_ned[i, slot] = own_ned
-    tracked.kinds[i, slot] = wp.where(is_seen, 1 + has_depth, 0)
+    tracked.kinds[i, slot] = wp.where(is_seen, 1 + is_measured, 0)
