@@ -2,7 +2,7 @@
 
 In: policy files of FollowMe that all see the same, such as several seeds of a recipe. Out: how long each stays in the
 band, with 95 % intervals, best first by where the interval begins, and that one as FILE, whose card says it; those with
-`observation=tracked` fly under the guard's rule of the owner. The episodes, of split `validation`, are not flown in a
+`observation=tracked` fly under the guard's rule of people. The episodes, of split `validation`, are not flown in a
 test, nor trained on since there is that split.
 """
 

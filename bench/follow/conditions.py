@@ -1,7 +1,7 @@
 """`python -m bench.follow.conditions POLICY…`: policies without images in harder conditions, judged in batch.
 
 In: policy files of FollowMe with `observation=tracked`. Out: how long they stay in the band and how often they touch
-something, with intervals, in worlds of the test split, without a guard; sights are drawn from the model that training
+something, with intervals, in worlds of the test split, under the guard's rules of people alone; sights are drawn from the model that training
 has. What a policy comes to in flight only `honeyguide benchmark follow` tells: this takes a minute a policy, that an
 hour.
 """
@@ -38,7 +38,7 @@ def main(
         list[str] | None, typer.Option(help="Default: all without hiding, by the usual airframe.")
     ] = None,
     *,
-    guard: Annotated[bool, typer.Option(help="Under the guard's rules of the owner; not of trees.")] = True,
+    guard: Annotated[bool, typer.Option(help="Under the guard's rules of people; not of trees.")] = True,
 ) -> None:
     names = condition or [name for name in _IN_BATCH if not name.startswith("gone")]
     unknown = [name for name in names if name not in _IN_BATCH]

@@ -1,7 +1,8 @@
 """Logged flights of a follower as episodes of FollowMe: of its tracked setting, or of that with images.
 
 In: decisions, and the truth where the log has it. Out: rewards and ends by the task's own functions, on the truth, or
-else on what the senses knew, which is in the frames of all followers' logs; what it struck by its accelerometers.
+else on what the senses knew, which is in the frames of all followers' logs; what it struck by its accelerometers. A log
+has no others about: room to them costs nothing here.
 """
 
 from typing import Any

@@ -41,7 +41,7 @@ class Sight:
         float  # than CHEST_M above their feet: the middle of the chest that images show, of who is small or crouches
     )
     reach_m: float  # to the nearest part of the owner's body
-    room_m: float  # to the nearest trunk, crown, wall or ground, at most ROOM_MAX_M
+    room_m: float  # to the nearest trunk, crown, wall, ground or, in training, other person, at most ROOM_MAX_M
     is_free: int  # nothing stands between lens and owner
     is_in_view: int  # and the image shows them
 
