@@ -1,9 +1,9 @@
 """`python -m bench.follow.conditions POLICY…`: policies without images in harder conditions, judged in batch.
 
 In: policy files of FollowMe with `observation=tracked`. Out: how long they stay in the band and how often they touch
-something, with intervals, in worlds of the test split, under the guard's rules of people alone; sights are drawn from the model that training
-has. What a policy comes to in flight only `honeyguide benchmark follow` tells: this takes a minute a policy, that an
-hour.
+something, with intervals, in worlds of the test split, under the guard's rules of people alone; sights are drawn from
+the model that training has. What a policy comes to in flight only `honeyguide benchmark follow` tells: this takes a
+minute a policy, that an hour.
 """
 
 from pathlib import Path
