@@ -20,14 +20,13 @@ from policies.tasks.follow_me.observe import (
     IMAGE_CHANNELS,
     IMAGE_SIZE,
     LAYOUT_VERSION,
+    REPORT_LAG_S,
     REPORT_OLD_S,
     OwnerReport,
     observe_rows,
     vector_elements,
 )
 from policies.tasks.layout import ImageElement, Layout
-
-REPORT_LAG_S = 0.3  # of a phone's position when it arrives; guess: phones do not say, their clock is not ours
 
 Floats = NDArray[np.float32]
 

@@ -8,8 +8,8 @@ images and reports.
 from math import asin, atan2, inf, isfinite, sqrt
 
 from common.attitude import Quat, Vector, product, quat_of, yaw_of
-from policies.companion.observation import REPORT_LAG_S
 from policies.companion.vehicle_link import Own, Owner
+from policies.tasks.follow_me.observe import REPORT_LAG_S
 from policies.tracker import OwnerTrack, OwnerTracker, PhoneReport, Sighting
 
 _AHEAD = (0.5, 0.5, 0.5, 0.5)  # q_frd_from_rdf of an eye that looks ahead

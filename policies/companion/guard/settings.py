@@ -11,6 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from common.config.refusal import meant_or_known, sentence
 from policies.tasks.follow_me.tracked.keep_off import (
     ESCAPE_CLIMB_M_S,
+    IMAGE_SLOW_S,
+    IMAGE_STOP_S,
     OWNER_BRAKE_M_S2,
     OWNER_M,
     REACTION_S,
@@ -95,9 +97,9 @@ class GuardSettings(BaseModel):
     """... and where others were met: so far over their heads that they are no obstacle."""
     search_yaw_rate: float = Field(default=1.2, gt=0.0, le=3.0)
     """[rad/s] to look all round."""
-    image_slow_s: float = Field(default=0.55, gt=0.0, le=IMAGES_S)
+    image_slow_s: float = Field(default=IMAGE_SLOW_S, gt=0.0, le=IMAGES_S)
     """From this age of the picture on it becomes slower ..."""
-    image_stop_s: float = Field(default=0.8, gt=0.0, le=IMAGES_S)
+    image_stop_s: float = Field(default=IMAGE_STOP_S, gt=0.0, le=IMAGES_S)
     """... until it stands."""
     telemetry_slow_s: float = Field(default=0.2, gt=0.0, le=IMAGES_S)
     """Without attitude or position from the vehicle for so long it becomes slower: they come fifty times a second, and

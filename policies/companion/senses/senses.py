@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from common.attitude import Vector, inverse, quat_of, rotated, yaw_of
 from common.image_stream import ImageFrame
-from policies.companion.observation import REPORT_LAG_S
 from policies.companion.owner_watch import OwnerWatch, sighting_from
 from policies.companion.senses.local_map import LocalMap, has_depth
 from policies.companion.senses.looks import UNLIKE
@@ -25,6 +24,7 @@ from policies.companion.senses.seen_owner import PersonNow, SeenOwner, Sight
 from policies.companion.vehicle_link import Own, Owner
 from policies.mono_depth.network import MonoDepth
 from policies.person_detector.detector import SURE, Detection, PersonDetector
+from policies.tasks.follow_me.observe import REPORT_LAG_S
 
 Floats = NDArray[np.float64]
 PHONE_OLD_S = 3.0

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
 from policies.tasks.flight.hover_bank import LOW_M
-from policies.tasks.flight.own_state import ACTIONS
+from policies.tasks.flight.own_state import ACTIONS, Command
 from policies.tasks.flight.ranges import RANGES, measure_ranges
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
 from policies.tasks.follow_me.cast import PEOPLE_MAX
@@ -24,6 +24,7 @@ from policies.tasks.follow_me.follow_me_kernels import (
     FollowState,
     Rules,
     act,
+    decide,
     judge,
     look,
     place,
@@ -114,6 +115,7 @@ class FollowMe(FlightTask):
 
     def _launch_step(self) -> None:
         """What `step` does of the task's own."""
+        self._decide.launch()
         for act_part in self._acts:
             act_part.launch()
             self.rig.advance(ACT_TICKS)
@@ -194,6 +196,7 @@ class FollowMe(FlightTask):
         state.flight = typed_rows(self.buffers.params, FlightParams)
         state.params = typed_rows(self.buffers.params, FollowParams, first=len(FLIGHT_PARAMS))
         state.actions = self._zeros("last_actions", n, wp.vec4)
+        state.asked = wp.zeros(n, dtype=Command, device=self.device)  # of one step only
         state.people = self._zeros("people", n, Person)
         others = PEOPLE_MAX - 1
         state.bystanders = self._zeros("bystanders", (n, others), Person)
@@ -221,7 +224,8 @@ class FollowMe(FlightTask):
 
         record = self.record
         parts = range(DECISION_TICKS // ACT_TICKS)
-        self._acts = [record(act, buffers, rules, rig, state, part) for part in parts]
+        self._decide = record(decide, buffers, rules, rig, state)
+        self._acts = [record(act, rig, state, part) for part in parts]
         self._walk = record(walk, buffers, rules, rig, state)
         self._look_all = record(look, rig, state, state.is_all)
         self._measure_all = record(measure_ranges, rig, state.is_all, state.nearness)

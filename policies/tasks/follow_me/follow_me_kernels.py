@@ -1,6 +1,7 @@
 """FollowMe's kernels, one thread per environment, in the order of a decision.
 
-act       actions to setpoints                           (then the rig advances)
+decide    actions to what they ask for
+act       that to setpoints                              (then the rig advances)
 walk      the owner, their phone and others, over the same time
 look      where the owner truly is from there            (then ranges and images are taken, or sights drawn)
 judge     the vector, the reward, the end                (rows that end start anew:)
@@ -35,7 +36,14 @@ from policies.tasks.follow_me.cast import (
     phone_of,
 )
 from policies.tasks.follow_me.follow_me_params import FollowParams
-from policies.tasks.follow_me.observe import REPORT_OLD_S, TRACKED, OwnerReport, document_action, write_vector
+from policies.tasks.follow_me.observe import (
+    REPORT_LAG_S,
+    REPORT_OLD_S,
+    TRACKED,
+    OwnerReport,
+    document_action,
+    write_vector,
+)
 from policies.tasks.follow_me.others import kept_from_others, room_between
 from policies.tasks.follow_me.owner_visibility import Sight, lens_in, reach_from, see
 from policies.tasks.follow_me.privileged import write_privileged
@@ -59,6 +67,7 @@ _STEP_S = wp.constant(PERSON_DT_S)
 _STEP_TICKS = wp.constant(PERSON_TICKS)
 _TICKS_PER_S = wp.constant(1.0 / TICK_S)
 _PART_S = wp.constant(ACT_TICKS * TICK_S)
+_REPORT_LAG_S = wp.constant(REPORT_LAG_S)
 _PRIVILEGED = wp.constant(-1)
 _DISTANCE_STREAM = wp.constant(6)
 _BEARING_STREAM = wp.constant(7)
@@ -92,6 +101,7 @@ class FollowState:
     flight: wp.array(dtype=FlightParams)
     params: wp.array(dtype=FollowParams)
     actions: wp.array(dtype=wp.vec4)  # the last
+    asked: wp.array(dtype=Command)  # by them
     people: wp.array(dtype=Person)  # the owners
     bystanders: wp.array2d(dtype=Person)  # (envs, others)
     drawn: wp.array2d(dtype=Person)  # (envs, people): all as cameras can see them
@@ -123,13 +133,18 @@ def chosen_action(buffers: StepBuffers, rules: Rules, i: int) -> wp.vec4:
 
 
 @wp.kernel(enable_backward=False)
-def act(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState, part: int) -> None:
-    """Gives the flight controller the actions that reach it in this part of the decision."""
+def decide(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState) -> None:
+    """What the actions ask for, as a companion makes it of them at once."""
     i = wp.tid()
-    if int(wp.round(state.params[i].setpoint_lag_s / _PART_S)) != part:
-        return
-    command = asked(buffers, rules, rig, state, i)
-    rig.autopilot.setpoint[i] = velocity_setpoint(command)
+    state.asked[i] = asked(buffers, rules, rig, state, i)
+
+
+@wp.kernel(enable_backward=False)
+def act(rig: RigArrays, state: FollowState, part: int) -> None:
+    """Gives the flight controller what reaches it in this part of the decision."""
+    i = wp.tid()
+    if int(wp.round(state.params[i].setpoint_lag_s / _PART_S)) == part:
+        rig.autopilot.setpoint[i] = velocity_setpoint(state.asked[i])
 
 
 @wp.kernel(enable_backward=False)
@@ -182,10 +197,11 @@ def look(rig: RigArrays, state: FollowState, rows: wp.array(dtype=wp.bool)) -> N
 
 
 @wp.func
-def owner_report(phone: PhoneState, tick: int) -> OwnerReport:
-    """What the phone's newest report tells at a tick."""
+def owner_report(phone: PhoneState, model: PhoneModel, tick: int) -> OwnerReport:
+    """What the phone's newest report tells at a tick; how late it came nobody knows, and takes it to be the usual."""
     report = OwnerReport()
-    age_s = float(wp.int64(tick) * wp.int64(TICK_US) - phone.fix.time_us) * 1.0e-6
+    true_age_s = float(wp.int64(tick) * wp.int64(TICK_US) - phone.fix.time_us) * 1.0e-6
+    age_s = true_age_s - float(model.lag_ticks) / _TICKS_PER_S + _REPORT_LAG_S
     if phone.fix.is_known == 1 and age_s < REPORT_OLD_S:
         report.pos_ned = phone.fix.pos_ned
         report.vel_ned = phone.fix.vel_ned
@@ -223,8 +239,8 @@ def asked(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState
     command = next_command(state.tracked.commands[i], action, q_ned_from_frd)
     if state.params[i].guard == 1.0:
         own = own_state(rig, i, rules.has_estimator)
-        command = guarded(command, own, state.tracked.filters[i], rules.keep_off)
         age_s = state.image_ages_s[i]
+        command = guarded(command, own, state.tracked.filters[i], age_s, rules.keep_off)
         people, tracked = state.drawn, state.tracked
         command = kept_from_others(command, own, rig.truth[i], people, tracked, age_s, rules.keep_off, i)
     state.tracked.before[i] = state.tracked.commands[i]
@@ -244,7 +260,7 @@ def write_frame(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: Follo
         write_tracked_frame(buffers, rules, rig, state, i, at)
     else:
         own = own_state(rig, i, rules.has_estimator)
-        report = owner_report(state.phones[i], draw_tick(rig.tick[i]))
+        report = owner_report(state.phones[i], state.phone_models[i], draw_tick(rig.tick[i]))
         age_s = state.image_ages_s[i]
         write_vector(rules.vector, own, report, action, age_s, buffers.observations, i, at)
     if rules.has_privileged == 1:

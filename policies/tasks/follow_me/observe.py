@@ -46,6 +46,7 @@ _POSITION_SCALE = wp.constant(5.0)  # [m]
 _POSITION_MAX = wp.constant(4.0)  # an owner reported farther than this many scales away is shown at that distance
 IMAGE_SHOWN_OLD_S = wp.constant(0.5)  # an older picture is shown as one of this age
 REPORT_OLD_S = wp.constant(5.0)  # a report older than this tells nothing; guess
+REPORT_LAG_S = 0.3  # of a phone's position when it arrives; guess: phones do not say, their clock is not ours
 DEPTH_HALF_M = wp.constant(4.0)  # this far away the depth channel is at half of its range
 _SKY_M = wp.constant(1000.0)  # depths from here on are the sky's
 

@@ -7,12 +7,21 @@ trees it does by a map, which training has not.
 import warp as wp
 
 from policies.tasks.flight.own_state import Command, OwnState
-from policies.tasks.follow_me.tracked.keep_off import SLOW_S, STOP_S, KeepOff, bounds, kept_off
+from policies.tasks.follow_me.tracked.keep_off import (
+    IMAGE_SLOW_S,
+    IMAGE_STOP_S,
+    SLOW_S,
+    STOP_S,
+    KeepOff,
+    bounds,
+    kept_off,
+)
 from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, place_now, std_along, velocity_now
 
 wp.set_module_options({"enable_backward": False})
 
 _SLOW_S, _STOP_S = wp.constant(SLOW_S), wp.constant(STOP_S)
+_IMAGE_SLOW_S, _IMAGE_STOP_S = wp.constant(IMAGE_SLOW_S), wp.constant(IMAGE_STOP_S)
 
 
 @wp.func
@@ -28,11 +37,18 @@ def kept_from(
 
 
 @wp.func
-def guarded(command: Command, own: OwnState, owner: OwnerFilter, k: KeepOff) -> Command:
-    """What is flown of a command."""
+def faded(age_s: float, slow_s: float, stop_s: float) -> float:
+    """What is left of a velocity, from all to nothing."""
+    return wp.clamp((stop_s - age_s) / (stop_s - slow_s), 0.0, 1.0)
+
+
+@wp.func
+def guarded(command: Command, own: OwnState, owner: OwnerFilter, image_age_s: float, k: KeepOff) -> Command:
+    """What is flown of a command, the newest image being so old."""
+    command.vel_ned = faded(image_age_s, _IMAGE_SLOW_S, _IMAGE_STOP_S) * command.vel_ned
     if owner.is_known == 0:
         return command
-    command.vel_ned = wp.clamp((_STOP_S - owner.age_s) / (_STOP_S - _SLOW_S), 0.0, 1.0) * command.vel_ned
+    command.vel_ned = faded(owner.age_s, _SLOW_S, _STOP_S) * command.vel_ned
     way = place_now(owner) - own.pos_ned
     std = std_along(owner.both.vel_var, wp.vec2(way[0], way[1]))
     return kept_from(command, own, way, velocity_now(owner), std, owner.age_s, k)

@@ -26,6 +26,7 @@ _HIGH_WITHIN_M = wp.constant(4.0)
 _RISE_M_S = wp.constant(0.8)
 _CLIMBS_S = wp.constant(0.35)  # who comes is climbed over by the way that they go in so long at the latest; guess
 SLOW_S, STOP_S = 0.7, 2.0  # without a sight of them for so long it becomes slower, until it stands
+IMAGE_SLOW_S, IMAGE_STOP_S = 0.55, 0.8  # and where the newest image is so old
 _TURNS_M_S2 = wp.constant(2.5)  # how fast a person stops, turns and sets off; guess
 _UNTOLD_S = wp.constant(1.0)  # who was not seen for longer may be anywhere: nothing is reckoned from farther back
 _REPORTED_S = wp.constant(0.25)  # from the first picture of who sets off until their velocity tells it; measured,

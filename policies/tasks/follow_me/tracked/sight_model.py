@@ -50,9 +50,12 @@ _STRAY_M = wp.constant(0.4)
 _STOLEN_M = wp.constant(0.9)  # so near the owner somebody else may be taken for them,
 _STOLEN = wp.constant(0.3)
 _HIDES_M = wp.constant(0.35)  # beside the line of sight somebody else hides them
-_HOLD = wp.constant(60)  # decisions for which a map remembers
+_HOLD = wp.constant(150)  # decisions for which a map remembers
 HALF_VIEW_RAD = wp.constant(0.72)
-_FORGETS = wp.constant(0.983)  # of the way flown, a decision: what six seconds' map is good for
+_FORGETS = wp.constant(0.9933)  # of the way flown, a decision: what fifteen seconds' map is good for
+_IN_A_ROW = wp.constant(4)  # images that must show them, after so long without:
+_GONE_S = wp.constant(1.0)
+_MISSED = wp.constant(3)  # with no more than so many between two that do not
 _MAP_STD_M = wp.constant(0.12)
 _MAP_COLOUR_STD = wp.constant(0.08)  # of the range, by colours: `policies.mono_depth.training --judge`
 
@@ -69,7 +72,9 @@ class Tracked:
     kinds: wp.array2d(dtype=int)  # 0: nobody seen, 1: range by colours, 2: by depth
     shown: wp.array(dtype=int)  # the picture that was taken in last
     looked: wp.array2d(dtype=int)  # (envs, SECTORS) pictures since each direction of the world was looked at
-    travelled_m: wp.array(dtype=float)
+    trails_ned: wp.array(dtype=wp.vec2)  # [m] the way that it flew as it looked, lately
+    in_row: wp.array(dtype=int)  # images that showed the owner, one after the other
+    missed: wp.array(dtype=int)  # and those since that did not
     nearness: wp.array2d(dtype=float)  # (envs, SECTORS) as a map knows it
     has_depth: wp.array(dtype=int)  # it is measured, not told from colours
     others_ned: wp.array2d(dtype=wp.vec3)  # (envs, others) where images showed them last
@@ -87,7 +92,9 @@ def make_tracked(zeros: Callable[[str, Any, Any], Any], count: int) -> Any:
     tracked.kinds = zeros("sight_kinds", (count, kept), int)
     tracked.shown = zeros("sights_shown", count, int)
     tracked.looked = zeros("looked", (count, SECTORS), int)
-    tracked.travelled_m = zeros("travelled", count, float)
+    tracked.trails_ned = zeros("trails_ned", count, wp.vec2)
+    tracked.in_row = zeros("in_row", count, int)
+    tracked.missed = zeros("missed", count, int)
     tracked.nearness = zeros("mapped_nearness", (count, SECTORS), float)
     tracked.has_depth = zeros("has_depth", count, int)
     tracked.others_ned = zeros("others_ned", (count, OTHERS), wp.vec3)
@@ -176,10 +183,37 @@ def map_known(
         near = nearness[i, j]
         far_m = REACH_M * (1.0 - near)
         absolute = ((j + turn) % _SECTORS + _SECTORS) % _SECTORS
-        is_known = tracked.looked[i, absolute] < _HOLD or far_m < 0.6 * tracked.travelled_m[i]
+        bearing = yaw + float(j) * _SECTOR_RAD
+        lies = far_m * wp.vec2(wp.cos(bearing), wp.sin(bearing))
+        is_known = tracked.looked[i, absolute] < _HOLD or was_passed(lies, tracked.trails_ned[i])
         std_m = wp.where(has_depth(n), _MAP_STD_M, _MAP_COLOUR_STD * far_m)
         known = wp.where(is_known and near > 0.0 and far_m < reach_m, 1.0, 0.0)
         tracked.nearness[i, j] = known * wp.clamp(near + std_m / REACH_M * wp.randn(state), 0.0, 1.0)
+
+
+@wp.func
+def was_passed(off: wp.vec2, trail: wp.vec2) -> bool:
+    """Whether something that lies so [m] was in view ahead, 45 degrees to either side, on the way to here."""
+    far_m = wp.length(trail)
+    if far_m < 0.1:
+        return False
+    along = wp.dot(off, trail) / far_m
+    aside = wp.abs(off[0] * trail[1] - off[1] * trail[0]) / far_m
+    return far_m + along > aside
+
+
+@wp.func
+def is_believed(tracked: Tracked, i: int, is_there: bool) -> bool:
+    """Whether an image that shows the owner is taken in: after some time without, only the last of some in a row."""
+    if not is_there:
+        tracked.missed[i] = tracked.missed[i] + 1
+        if tracked.missed[i] > _MISSED:
+            tracked.in_row[i] = 0
+        return False
+    tracked.missed[i] = 0
+    tracked.in_row[i] = tracked.in_row[i] + 1
+    f = tracked.filters[i]
+    return f.is_known == 0 or f.age_s < _GONE_S or tracked.in_row[i] >= _IN_A_ROW
 
 
 @wp.kernel(enable_backward=False)
@@ -209,10 +243,14 @@ def sense(
         tracked.commands[i] = Command()
         tracked.before[i] = Command()
         tracked.shown[i] = -1
-        tracked.travelled_m[i] = 0.0
+        tracked.trails_ned[i] = wp.vec2()
+        tracked.in_row[i] = 0
+        tracked.missed[i] = 0
         for j in range(_SECTORS):
             tracked.looked[i, j] = _HOLD
-    tracked.travelled_m[i] = _FORGETS * tracked.travelled_m[i] + _DECISION_S * wp.length(own.vel_ned)
+    nose = wp.vec2(wp.cos(yaw), wp.sin(yaw))
+    ahead = wp.max(nose[0] * own.vel_ned[0] + nose[1] * own.vel_ned[1], 0.0)
+    tracked.trails_ned[i] = _FORGETS * tracked.trails_ned[i] + _DECISION_S * ahead * nose
     map_known(n, tracked, nearness, yaw, seeds[i], i, k)
     take(n, sights[i], drawn, own.pos_ned, yaw, seeds[i], i, k, tracked)
     tracked.filters[i] = waited(tracked.filters[i], _DECISION_S)
@@ -221,7 +259,7 @@ def sense(
         tracked.shown[i] = shown
         at = shown % KEPT
         kind = tracked.kinds[i, at]
-        if kind > 0:
+        if is_believed(tracked, i, kind > 0):
             place, eye = tracked.sights_ned[i, at], tracked.eyes_ned[i, at]
             tracked.filters[i] = seen(tracked.filters[i], place, eye, kind - 1, way.age_s[i])
 
