@@ -8,7 +8,7 @@ lockstep flight on simulated time, and then the same flight gives the same bytes
 
 from collections import deque
 from collections.abc import Callable
-from math import isfinite
+from math import dist, isfinite
 
 import numpy as np
 
@@ -26,8 +26,10 @@ TELEMETRY_OLD_US = 500_000
 HEARTBEAT_OLD_US = 3_000_000  # sent at 1 Hz
 MISFIT = "the policy was made for another kind of vehicle"
 NO_DECISION = "the policy does not decide"
+NO_HEIGHT = "no height above the ground from a range finder that looks down"
 NOT_ALONE = "another companion is connected"
 LATENCIES_KEPT = 600  # a minute of decisions
+_CHANGED = 1e-3  # [m/s, rad/s] a velocity that is so much another is
 
 STILL: Velocity = ((0.0, 0.0, 0.0), 0.0)
 
@@ -68,6 +70,7 @@ class Companion:
         self._was_flying: bool | None = None  # at the decision before
         self._wall_s = wall_s
         self._action: Floats = np.zeros(skill.action_size, dtype=np.float32)
+        self._flown: Floats = self._action.copy()  # what was flown of it
         self._setpoint = STILL
         self._is_undecided = False  # the last action was no number
         self._setpoint_due_us = 0
@@ -143,11 +146,12 @@ class Companion:
         if sending is not Sending.POLICY:
             self._setpoint = STILL
             self._action[:] = 0.0
+            self._flown = np.zeros_like(self._action)
 
     def _decide(self, time_us: int) -> bool:
         """Lets the skill look, and decide if it flies; whether a decision was due."""
         own, is_flying = self.vehicle.own, self._sending is Sending.POLICY
-        action = self.skill.decide(own, self._action, time_us, is_flying=is_flying)
+        action = self.skill.decide(own, self._flown, time_us, is_flying=is_flying)
         if action is None:
             return False
         self._is_undecided = not np.isfinite(action).all()
@@ -157,6 +161,9 @@ class Companion:
         if is_flying:
             self._action = action
             self._setpoint = self.skill.setpoint(action, own)
+            self._flown = action
+            if _differ(self._setpoint, self.skill.wanted):
+                self._flown = self.skill.action_of(self._setpoint, own, action)
             self.decision_count += 1
         return True
 
@@ -233,9 +240,16 @@ class Companion:
         is_placed = isfinite(own.pos_ned[0])
         if not is_placed or time_us - min(own.attitude_us, own.position_us) > TELEMETRY_OLD_US:
             return "no attitude or position from the vehicle"
+        if not self.skill.drives and own.is_under_way and not isfinite(own.carried_height_m):
+            return NO_HEIGHT
         blindness = self.skill.blindness(own, time_us, is_flying=self._sending is Sending.POLICY)
         return blindness or (self._sticks.trouble if self._sticks is not None else "")
 
     @property
     def phase(self) -> Phase:
         return self.engagement.phase
+
+
+def _differ(flown: Velocity, wanted: Velocity) -> bool:
+    """Whether what is flown is not what was wanted."""
+    return dist(flown[0], wanted[0]) > _CHANGED or abs(flown[1] - wanted[1]) > _CHANGED

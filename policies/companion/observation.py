@@ -11,11 +11,19 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from common.attitude import Vector, rotated
+from common.attitude import Vector, inverse, quat_of, rotated, yaw_of
 from common.warp_start import start_warp
 from policies.companion.names import TASK
 from policies.companion.vehicle_link import Own, Owner
-from policies.tasks.flight.own_state import ACTIONS, Command, OwnState, command_rows
+from policies.tasks.flight.own_state import (
+    ACTIONS,
+    CLIMB_MAX_M_S,
+    SPEED_MAX_M_S,
+    YAW_RATE_MAX_RAD_S,
+    Command,
+    OwnState,
+    command_rows,
+)
 from policies.tasks.follow_me.observe import (
     IMAGE_CHANNELS,
     IMAGE_SIZE,
@@ -61,6 +69,14 @@ class CommandKernel:
         north, east, down = (float(element) for element in row["vel_ned"])
         return (north, east, down), float(row["yaw_rate"])
 
+    @staticmethod
+    def action_of(velocity: Vector, yaw_rate: float, own: Own, action: Floats) -> Floats:
+        """The other way round, of a setpoint; of an action that asked for something else, where no yaw rate is sent."""
+        ahead, right, down = rotated(inverse(quat_of(yaw_of(own.q_ned_from_frd), 0.0)), velocity)
+        turns = yaw_rate / float(YAW_RATE_MAX_RAD_S) if isfinite(yaw_rate) else float(action[3])
+        most = (float(SPEED_MAX_M_S), float(SPEED_MAX_M_S), float(CLIMB_MAX_M_S))
+        return np.array([ahead / most[0], right / most[1], down / most[2], turns], np.float32)
+
 
 def write_own_row(row: Any, own: Own) -> None:
     """Telemetry as a row of `OwnState`.
@@ -73,8 +89,9 @@ def write_own_row(row: Any, own: Own) -> None:
     row["vel_ned"] = own.vel_ned
     row["q_ned_from_frd"] = own.q_ned_from_frd
     row["yaw_rate"] = rotated(own.q_ned_from_frd, own.omega_frd)[2]
-    is_valid = isfinite(own.height_m)
-    row["height_m"] = own.height_m if is_valid else 0.0
+    height_m = own.carried_height_m
+    is_valid = isfinite(height_m)
+    row["height_m"] = height_m if is_valid else 0.0
     row["is_height_valid"] = int(is_valid)
 
 
@@ -119,6 +136,10 @@ class Observer:
     def setpoint(self, action: Floats, own: Own) -> tuple[Vector, float]:
         """Velocity in ned [m/s] and yaw rate [rad/s] of an action in [-1, 1], shape (4,)."""
         return self._command.setpoint(action, own)
+
+    def action_of(self, velocity: Vector, yaw_rate: float, own: Own, action: Floats) -> Floats:
+        """The other way round."""
+        return self._command.action_of(velocity, yaw_rate, own, action)
 
     def _write_report(self, owner: Owner, time_us: int) -> None:
         row = self._report[0]

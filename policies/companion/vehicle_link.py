@@ -34,6 +34,7 @@ Listener = Callable[[int, int, Any, int], None]
 
 COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 RANGE_OLD_US = 500_000  # a range measured longer ago tells nothing of the ground below
+GROUND_OLD_US = 5_000_000  # nor where that was, after so long; guess: 15 m of a walk's speed of terrain like before
 OVERTAKEN_US = 1_000_000  # an attitude older by no more has been overtaken; by more, the vehicle has restarted; guess
 REQUEST_US = 5_000_000  # rates are asked for again: the vehicle may have restarted
 TEXT_LENGTH = 50  # characters of one STATUSTEXT
@@ -87,6 +88,8 @@ class Own:
     late_s: float = 0.0  # by now, since the older of the newest attitude and the newest position came in
     range_m: float = nan  # along the body's down axis; NaN: no return, or none heard of for RANGE_OLD_US
     range_us: int = NEVER_US
+    ground_down_m: float = nan  # in ned, where the range finder saw ground last,
+    ground_us: int = NEVER_US  # and when
     heartbeat_us: int = NEVER_US
     is_ground_vehicle: bool = False
     is_armed: bool = False
@@ -109,6 +112,13 @@ class Own:
     def height_m(self) -> float:
         """Above the ground [m], by the range finder; NaN: not known."""
         return self.range_m * rotated(self.q_ned_from_frd, (0.0, 0.0, 1.0))[2]
+
+    @property
+    def carried_height_m(self) -> float:
+        """The same, for a while as it moves on from where the range finder saw ground last; NaN: not known."""
+        if isfinite(self.height_m) or self.attitude_us - self.ground_us > GROUND_OLD_US:
+            return self.height_m
+        return self.ground_down_m - self.pos_ned[2]
 
     @property
     def is_under_way(self) -> bool:
@@ -363,8 +373,11 @@ class VehicleLink:
         if fields.orientation != _LOOKS_DOWN:
             return
         is_inside = fields.min_distance <= fields.current_distance <= fields.max_distance
-        self.own.range_m = fields.current_distance * 0.01 if is_inside else nan
-        self.own.range_us = time_us
+        own = self.own
+        own.range_m = fields.current_distance * 0.01 if is_inside else nan
+        own.range_us = time_us
+        if is_inside:
+            own.ground_down_m, own.ground_us = own.pos_ned[2] + own.height_m, time_us
 
     def _heartbeat_reported(self, fields: Any, time_us: int) -> None:
         own = self.own

@@ -25,7 +25,14 @@ from policies.companion.skills.goal_skill import GoalSkill
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.vector_pilot import DrivingPilot
 from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
-from policies.tasks.drive.observe import FRAME, DriveCommand, command_rows, observe_rows
+from policies.tasks.drive.observe import (
+    FRAME,
+    SPEED_MAX_M_S,
+    YAW_RATE_MAX_RAD_S,
+    DriveCommand,
+    command_rows,
+    observe_rows,
+)
 
 ARRIVED_M, ALIGNED_RAD, STANDING_M_S = 0.25, 0.14, 0.25  # by the estimate: training's last lesson
 STILL_M_S = 0.05
@@ -120,6 +127,9 @@ class Driving(GoalSkill):
         """What an action asks for, along the nose, as the guard lets it."""
         speed, yaw_rate = self._observer.command(action)
         return self._guarded(((speed, 0.0, 0.0), yaw_rate), own)
+
+    def action_of(self, flown: Velocity, own: Own, action: Floats) -> Floats:  # noqa: ARG002
+        return self._observer.action_of(flown[0][0], flown[1])
 
     def recorded_goal(self, own: Own) -> Vector:
         return self.goal_pose(own) or NO_GOAL
@@ -256,3 +266,8 @@ class DriveObserver:
         self._ask.launch()
         row = self._command[0]
         return float(row["speed"]), float(row["yaw_rate"])
+
+    @staticmethod
+    def action_of(speed: float, yaw_rate: float) -> Floats:
+        """The other way round."""
+        return np.array([speed / float(SPEED_MAX_M_S), yaw_rate / float(YAW_RATE_MAX_RAD_S)], np.float32)

@@ -23,6 +23,7 @@ from policies.companion.odometry.by_sight import BySight
 from policies.companion.owner_watch import OwnerWatch
 from policies.companion.senses.image_fit import NO_IMAGES, OTHER_CLOCK, misfit
 from policies.companion.senses.senses import Senses
+from policies.companion.skills.pace import Pace
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.tracked_observer import TrackedObserver
 from policies.companion.tracked_recorder import RECORD_LAYOUT, TrackedRecorder
@@ -30,9 +31,6 @@ from policies.companion.vehicle_link import Own, Owner, VehicleLink
 from policies.tasks.follow_me.observe import EGO_BLIND, TRACKED
 from policies.tasks.layout import Layout
 
-DECISION_US = 100_000
-DECISION_EARLY_US = 50_000  # an image may come this much earlier than the decision period asks
-DECISION_LATE_US = 50_000  # and is waited for this much longer
 IMAGE_OLD_US = 500_000  # guess: five images missed, 3 m at full speed
 IMAGE_EARLY_US = 500_000  # telemetry may be so much later than an image; of a later stamp nobody knows the age
 GUARDED_OLD_US = 2_500_000  # the guard stands still before
@@ -104,7 +102,7 @@ class Following:
         self._owner = Owner()
         self._image: ImageFrame | None = None  # the newest
         self._image_us = -1  # when it came in, on our clock; -1: never
-        self._decided_us = -DECISION_US  # when was decided last, on our clock
+        self._pace = Pace()
         self._is_early = False  # the newest image was stamped later than now, and left out
         self._is_new = False  # there is an image that was not decided on
         self._has_looked = False  # at the newest image
@@ -142,9 +140,7 @@ class Following:
             self.guard.reckon_with(self._delay.late_s)
         if self._recorder is not None:
             self._recorder.sense(vehicle.own, self._owner, image)
-        since_us = time_us - self._decided_us
-        wait_us = DECISION_US + (-DECISION_EARLY_US if self._is_new else DECISION_LATE_US)
-        return self._image is not None and since_us >= wait_us
+        return self._image is not None and self._pace.is_due(time_us, is_new=self._is_new)
 
     def is_ordered(self) -> bool:
         return False
@@ -196,7 +192,8 @@ class Following:
         image = self._image
         if image is None:
             return None
-        self._decided_us, self._is_new = time_us, False
+        self._pace.decided(time_us)
+        self._is_new = False
         age_s = max(own.boot_us - image.time_us, time_us - self._image_us, 0) * 1e-6
         if self._tracked is not None:
             vector = self._tracked.vector(own, age_s)
@@ -222,6 +219,9 @@ class Following:
         self.wanted = self._observer.setpoint(action, own)
         return self._guarded(self.wanted, own)
 
+    def action_of(self, flown: Velocity, own: Own, action: Floats) -> Floats:
+        return action if self._observer is None else self._observer.action_of(*flown, own, action)
+
     def _guarded(self, wanted: Velocity, own: Own) -> Velocity:
         """What the guard lets be flown."""
         if self.guard is None:
@@ -230,8 +230,8 @@ class Following:
         if self.guard.stance is not self._stance:
             if self._vehicle is not None:
                 self._vehicle.say(f"Companion: {self.guard.stance.value}")
-            if self._stance in STANDING and self.guard.stance is Stance.FREE:
-                self._pilot.reset()  # what it remembers is from before
+            if self._tracked is None and self._stance in STANDING and self.guard.stance is Stance.FREE:
+                self._pilot.reset()  # what it remembers is from before; the frames of who looks at no image are true
             self._stance = self.guard.stance
         text = self._beginning.text(self.guard.interventions.latest, own.boot_us)
         if text and self._vehicle is not None:

@@ -16,13 +16,12 @@ from policies.companion.guard.goal_guard import STANDING, GoalGuard, GoalStance
 from policies.companion.guard.interventions import BeginningReasons, Interventions
 from policies.companion.owner_goal import OwnerGoal
 from policies.companion.ranges import OLD_US, Ranges
+from policies.companion.skills.pace import Pace
 from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.vector_pilot import VectorPilot
 from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
 from policies.tasks.layout import Layout
 
-DECISION_US, DECISION_EARLY_US = 100_000, 10_000
-DECISION_LATE_US = 50_000  # a scan is waited for so much longer
 GUARDED_OLD_US = 2_500_000  # the guard stands still before
 NO_GOAL = "no goal"
 
@@ -61,7 +60,8 @@ class GoalSkill:
         self._is_ordered_by_goto = is_ordered_by_goto
         self._pilot = pilot
         self._stack = frames
-        self._decided_us = -DECISION_US
+        self._pace = Pace()
+        self._is_new = False  # there is a scan that was not decided on
         self.guard = guard
         self._stance = GoalStance.FREE  # as told
         self._beginning = BeginningReasons()
@@ -77,11 +77,10 @@ class GoalSkill:
     def receive(self, vehicle: VehicleLink, time_us: int, *, is_flying: bool) -> bool:
         self.goals.frame(time_us)
         self.ranges.follow()
-        is_new = self.ranges.take_new()
-        if self.guard is None:
-            return is_new
-        self.guard.sense(vehicle.own, self.ranges)
-        return is_new or (is_flying and time_us - self._decided_us >= DECISION_US + DECISION_LATE_US)
+        self._is_new = self.ranges.take_new() or self._is_new
+        if self.guard is not None:
+            self.guard.sense(vehicle.own, self.ranges)
+        return self._is_new or (self.guard is not None and is_flying and self._pace.is_due(time_us, is_new=False))
 
     def is_ordered(self) -> bool:
         return self.goals.is_ordered()
@@ -133,9 +132,10 @@ class GoalSkill:
 
     def _is_due(self, time_us: int) -> bool:
         """Whether a decision is due, which is then taken."""
-        if time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
+        if not self._pace.is_due(time_us, is_new=self._is_new):
             return False
-        self._decided_us = time_us
+        self._pace.decided(time_us)
+        self._is_new = False
         return True
 
     def _act(self, vector: Floats, *, is_flying: bool) -> Floats:

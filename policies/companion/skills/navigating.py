@@ -106,6 +106,9 @@ class Navigating(GoalSkill):
             return self._guarded(((slower * north, slower * east, 0.0), nan), own)
         return self._guarded(((slower * north, slower * east, down), yaw_rate), own)
 
+    def action_of(self, flown: Velocity, own: Own, action: Floats) -> Floats:
+        return self._command.action_of(*flown, own, action)
+
     def recorded_goal(self, own: Own) -> Vector:
         return self.goal_ned(own) or NO_GOAL
 

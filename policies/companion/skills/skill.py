@@ -87,11 +87,22 @@ class Skill(Protocol):
         ...
 
     def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:
-        """The action on what was received last, in [-1, 1]; None if none was due, or none came out as a number."""
+        """The action on what was received last, in [-1, 1]; None if none was due, or none came out as a number.
+
+        Args:
+            own: telemetry.
+            last_action: as it was flown.
+            time_us: the companion's own clock.
+            is_flying: the companion flies.
+        """
         ...
 
     def setpoint(self, action: Floats, own: Own) -> Velocity:
-        """What an action asks for."""
+        """What an action asks for, as its guard lets it."""
+        ...
+
+    def action_of(self, flown: Velocity, own: Own, action: Floats) -> Floats:
+        """The action that asks for what was flown in the place of another."""
         ...
 
     def conclude(self, own: Own) -> None:

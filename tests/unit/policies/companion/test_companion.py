@@ -7,14 +7,18 @@ from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, decode, encode
+from common.attitude import quat_of
 from common.image_stream import ImageFrame
-from policies.companion.companion import MISFIT, NO_DECISION, NOT_ALONE, Companion
+from policies.companion.companion import MISFIT, NO_DECISION, NO_HEIGHT, NOT_ALONE, Companion
 from policies.companion.engagement import Phase
 from policies.companion.guard.settings import GuardSettings
+from policies.companion.observation import CommandKernel
 from policies.companion.senses.image_fit import LENS, NO_IMAGES, OTHER_CLOCK, OTHER_LENS, OTHER_SIZE
+from policies.companion.skills.driving import DriveObserver
 from policies.companion.skills.following import IMAGE_OLD_US, Following
-from policies.companion.vehicle_link import COMPONENT
+from policies.companion.vehicle_link import COMPONENT, Own
 from policies.experts.follower import ScriptedFollower
+from policies.tasks.follow_me.observe import EGO, vector_elements
 
 FRAME_US = 20_000
 
@@ -57,6 +61,8 @@ class Air:
     """What the vehicle tells, and what it is told."""
 
     mav_type = 2  # a quadrotor
+    height_m = 5.0
+    has_range = True
 
     def __init__(self, guard=None):
         companion_end, self.end = memory_pair(LinkRole.ONBOARD)
@@ -76,7 +82,10 @@ class Air:
             self._tell("HEARTBEAT", type=self.mav_type, autopilot=12, base_mode=128, custom_mode=mode, system_status=4)
             self._tell("EXTENDED_SYS_STATE", landed_state=2)
             self._tell("ATTITUDE_QUATERNION", time_boot_ms=self.time_us // 1000, q1=1.0)
-            self._tell("LOCAL_POSITION_NED", x=1.0, z=-5.0)
+            self._tell("LOCAL_POSITION_NED", x=1.0, z=-self.height_m)
+            if self.has_range:
+                cm = round(100.0 * self.height_m)
+                self._tell("DISTANCE_SENSOR", min_distance=10, max_distance=4000, current_distance=cm, orientation=25)
             self.companion.frame(self.time_us)
             reported += [decode(frame) for data in self.end.receive() for frame in self._reader.feed(data)]
         return reported
@@ -93,6 +102,87 @@ def flown_air():
     air.run(1.0)
     assert air.companion.phase is Phase.FLYING
     return air
+
+
+def test_the_height_is_carried_on_while_the_range_finder_is_silent_and_then_it_hands_back():
+    air = flown_air()
+    heights_m = []
+    air.pilot.act = lambda vector, _: heights_m.append(vector[:]) or np.zeros(4, np.float32)
+    air.run(0.5)
+    before = heights_m[-1].copy()
+    air.has_range = False
+    air.height_m = 6.0
+    air.run(3.0)
+    assert air.companion.phase is Phase.FLYING
+    own = air.companion.vehicle.own
+    assert np.isnan(own.height_m)
+    assert own.carried_height_m == pytest.approx(6.0)
+    changed = heights_m[-1] != before
+    assert changed.sum() == 1  # the height alone: it is valid as before
+    said = air.run(3.0)
+    assert air.companion.trouble == NO_HEIGHT
+    assert any(NO_HEIGHT[:30] in message.fields.text for message in said if message.name == "STATUSTEXT")
+    air.mode = Mode.HOLD
+    air.run(0.5)
+    assert air.companion.phase is not Phase.FLYING
+
+
+def test_a_vehicle_without_a_range_finder_is_not_taken_over():
+    air = Air()
+    air.has_range = False
+    air.run(1.0)
+    air.mode = Mode.OFFBOARD
+    air.run(1.0)
+    assert air.companion.phase is not Phase.FLYING
+    assert air.companion.trouble == NO_HEIGHT
+
+
+def test_images_at_25_hertz_make_ten_decisions_a_second():
+    air = flown_air()
+    frame = 0
+
+    def take(time_us):
+        nonlocal frame
+        frame += 1
+        is_due = frame % 2 == 0  # each second frame of 20 ms: 25 Hz
+        return ImageFrame(time_us, 0, np.zeros(air.images.shape, np.uint8), *air.images.lens) if is_due else None
+
+    air.images.take = take
+    before = air.companion.decision_count
+    air.run(5.0)
+    assert air.companion.decision_count - before == pytest.approx(50, abs=1)
+
+
+def test_a_pilot_is_shown_what_was_flown_of_its_last_action_by_the_guard(monkeypatch):
+    monkeypatch.setattr(Following, "loss", lambda *_, **__: "")  # the owner is known
+    at = [element.name for element in vector_elements(EGO)].index("last_forward_sp")
+    shown = {}
+    for name, guard in (("alone", None), ("guarded", GuardSettings())):  # it sees nobody, and stands
+        air = Air(guard)
+        vectors = []
+        air.pilot.act = lambda vector, _, kept=vectors: kept.append(vector.copy()) or np.full(4, 0.5, np.float32)
+        air.run(1.0)
+        air.mode = Mode.OFFBOARD
+        air.run(4.0)
+        assert air.companion.phase is Phase.FLYING
+        assert air.companion.action == pytest.approx(np.full(4, 0.5))  # a log keeps what it chose
+        shown[name] = vectors[-1][at : at + 3]
+    assert shown["alone"] == pytest.approx([0.5, 0.5, 0.5])
+    assert shown["guarded"][:2] == pytest.approx([0.0, 0.0], abs=0.1)  # it stays where it was
+    assert shown["guarded"][2] < 0.3  # it is too high, and sinks
+
+
+def test_the_action_of_what_an_action_asks_for_is_that_action():
+    rng, command, observer = np.random.default_rng(2), CommandKernel(), DriveObserver(1)
+    for _ in range(20):
+        yaw = rng.uniform(-np.pi, np.pi)
+        own = Own(q_ned_from_frd=quat_of(yaw, 0.0))
+        action = rng.uniform(-1.0, 1.0, 4).astype(np.float32)
+        assert command.action_of(*command.setpoint(action, own), own, action) == pytest.approx(action, abs=1e-5)
+        driven = rng.uniform(0.1, 1.0, 2).astype(np.float32)
+        assert observer.action_of(*observer.command(driven)) == pytest.approx(driven, abs=1e-5)
+    velocity, _ = command.setpoint(action, own)
+    assert command.action_of(velocity, np.nan, own, action)[3] == action[3]  # no yaw rate is sent
 
 
 def test_a_policy_that_does_not_decide_hands_back_and_sends_no_number_that_is_none():
