@@ -3,6 +3,7 @@
 DECISION_US = 100_000
 EARLY_US = 50_000  # something new may come so much earlier,
 LATE_US = 50_000  # and is waited for so much longer
+_FOLLOWS = 0.05  # of how early or late a decision was, the next are: so that those of 10 Hz fall on what they are made on
 
 
 class Pace:
@@ -25,5 +26,6 @@ class Pace:
     def decided(self, time_us: int) -> None:
         """A decision is made: the next is due a period after this one was, or after now if this one was too late."""
         due_us = self._due_us + DECISION_US
+        off_us = time_us - due_us
         self._made_us = time_us
-        self._due_us = due_us if time_us - due_us <= 2 * LATE_US else time_us
+        self._due_us = due_us + round(_FOLLOWS * off_us) if off_us <= 2 * LATE_US else time_us

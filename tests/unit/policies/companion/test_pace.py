@@ -53,3 +53,9 @@ def test_after_a_pause_it_does_not_catch_up():
     arrivals_us = [*np.arange(0.0, 5e6, 1e5), *np.arange(10e6, SECONDS * 1e6, 1e5)]
     times = decided_us(arrivals_us, waits=False)
     assert np.diff(times).min() >= 1e5 - STEP_US
+
+
+@pytest.mark.parametrize("off_us", [8_000, 40_000, 60_000, 92_000])
+def test_ten_a_second_are_soon_decided_on_as_they_come_wherever_the_first_fell(off_us):
+    times = decided_us([0.0, *np.arange(off_us, SECONDS * 1e6, 1e5)])
+    assert (((times[20:] - off_us) % 100_000) < STEP_US).all()
