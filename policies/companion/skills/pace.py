@@ -3,7 +3,7 @@
 DECISION_US = 100_000
 EARLY_US = 50_000  # something new may come so much earlier,
 LATE_US = 50_000  # and is waited for so much longer
-_FOLLOWS = 0.05  # of how early or late a decision was, the next are: so that those of 10 Hz fall on what they are made on
+_FOLLOWS = 0.05  # of how early or late it was the next are: those of 10 Hz fall on what they are made on
 
 
 class Pace:
