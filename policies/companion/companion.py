@@ -19,7 +19,8 @@ from policies.companion.decision_log import Decision, OnDecision, motion_along_n
 from policies.companion.engagement import Engagement, Phase, Sending, Situation, Wish
 from policies.companion.skills.skill import Floats, Skill, Velocity
 from policies.companion.stick_control import StickControl
-from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
+from policies.companion.telemetry import NEVER_US, Own
+from policies.companion.vehicle_link import VehicleLink
 
 SETPOINT_US = 50_000
 TELEMETRY_OLD_US = 500_000

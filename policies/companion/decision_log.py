@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from common.attitude import Vector, rotated, yaw_of
 from policies.companion.guard.interventions import REASONS
 from policies.companion.skills.skill import Floats, Velocity
-from policies.companion.vehicle_link import Own
+from policies.companion.telemetry import Own
 from policies.tasks.layout import Layout
 
 TOPIC = "policy_decision"

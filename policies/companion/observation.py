@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from common.attitude import Vector, inverse, quat_of, rotated, yaw_of
 from common.warp_start import start_warp
 from policies.companion.names import TASK
-from policies.companion.vehicle_link import Own, Owner
+from policies.companion.telemetry import Own, Owner
 from policies.tasks.flight.own_state import (
     ACTIONS,
     CLIMB_MAX_M_S,

@@ -8,7 +8,7 @@ images and reports.
 from math import asin, atan2, inf, isfinite, sqrt
 
 from common.attitude import Quat, Vector, product, quat_of, yaw_of
-from policies.companion.vehicle_link import Own, Owner
+from policies.companion.telemetry import Own, Owner
 from policies.tasks.follow_me.observe import REPORT_LAG_S
 from policies.tracker import OwnerTrack, OwnerTracker, PhoneReport, Sighting
 

@@ -20,7 +20,8 @@ from common.range_sectors import SCANNER, RangeLayout
 from common.warp_start import start_warp
 from policies.companion.senses.poses import PoseHistory
 from policies.companion.skills.skill import Floats
-from policies.companion.vehicle_link import NEVER_US, VehicleLink
+from policies.companion.telemetry import NEVER_US
+from policies.companion.vehicle_link import VehicleLink
 from policies.tasks.flight.moved_ranges import move_rows, sectors_struct
 
 SCAN_HZ = 20.0  # that the vehicle is asked for

@@ -12,7 +12,8 @@ from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT
 from autopilot.mavlink.wire.number_bounds import PARAMETER_MAX, is_known
 from policies.companion.engagement import Wish
 from policies.companion.skills.skill import Velocity
-from policies.companion.vehicle_link import NEVER_US, VehicleLink
+from policies.companion.telemetry import NEVER_US
+from policies.companion.vehicle_link import VehicleLink
 
 SPEED, YAW_RATE, SPEED_DEAD, YAW_DEAD = "RO_SPEED_LIM", "RO_YAW_RATE_LIM", "MAN_DEADZONE", "RO_YAW_STICK_DZ"
 ASK_US = 500_000

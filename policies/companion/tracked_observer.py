@@ -14,7 +14,7 @@ from common.attitude import Vector, yaw_of
 from common.warp_start import start_warp
 from policies.companion.observation import write_own_row
 from policies.companion.senses.senses import Senses
-from policies.companion.vehicle_link import Own
+from policies.companion.telemetry import Own
 from policies.tasks.flight.own_state import Command, OwnState
 from policies.tasks.follow_me.tracked.vector import (
     REACH_M,

@@ -10,8 +10,8 @@ from common.image_stream import ImageFrame
 from policies.companion.names import TASK
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Floats, Velocity
+from policies.companion.telemetry import Own, Owner
 from policies.companion.tracked_observer import TrackedObserver
-from policies.companion.vehicle_link import Own, Owner
 from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.follow_me.observe import LAYOUT_VERSION
 from policies.tasks.follow_me.tracked.vector import TRACKED_ELEMENTS

@@ -36,7 +36,7 @@ from policies.companion.ranges import Ranges
 from policies.companion.senses.local_map import LocalMap
 from policies.companion.senses.poses import Pose
 from policies.companion.skills.skill import Velocity
-from policies.companion.vehicle_link import NEVER_US, Own
+from policies.companion.telemetry import NEVER_US, Own
 
 Floats = NDArray[np.float64]
 _MISSED_US = 300_000  # one in a hundred sectors misses what is there: so long what it told before counts

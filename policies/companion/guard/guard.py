@@ -30,7 +30,7 @@ from policies.companion.guard.rollouts import Rollouts
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
-from policies.companion.vehicle_link import NEVER_US, Own
+from policies.companion.telemetry import NEVER_US, Own
 
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate

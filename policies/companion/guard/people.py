@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from common.warp_start import start_warp
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.seen_owner import PersonNow
-from policies.companion.vehicle_link import Own
+from policies.companion.telemetry import Own
 from policies.tasks.follow_me.tracked.keep_off import OVER_M, Asked, Bounds, Person, keep_off, keep_off_all
 
 Floats = NDArray[np.float64]

@@ -18,7 +18,7 @@ from policies.companion.guard.limits import capped
 from policies.companion.guard.people import Somebody
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.local_map import Clearance, LocalMap
-from policies.companion.vehicle_link import Own
+from policies.companion.telemetry import Own
 from policies.tasks.flight.rollout import roll
 
 Floats = NDArray[np.float64]

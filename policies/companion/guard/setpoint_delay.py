@@ -10,7 +10,8 @@ from statistics import median_low
 from typing import Any
 
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT
-from policies.companion.vehicle_link import NEVER_US, VehicleLink
+from policies.companion.telemetry import NEVER_US
+from policies.companion.vehicle_link import VehicleLink
 
 _PERIOD_US = 500_000
 _ASKED = 8  # requests that an answer may be to

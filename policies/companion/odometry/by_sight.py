@@ -18,7 +18,8 @@ from common.image_stream import ImageFrame
 from policies.companion.odometry.visual_odometry import Motion, VisualOdometry
 from policies.companion.senses.poses import Pose
 from policies.companion.senses.senses import Senses
-from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
+from policies.companion.telemetry import NEVER_US, Own
+from policies.companion.vehicle_link import VehicleLink
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.attitude import Quat, Vector, rotated
-from policies.companion.vehicle_link import Own
+from policies.companion.telemetry import Own
 
 KEPT = 100  # of telemetry at 50 Hz: two seconds
 

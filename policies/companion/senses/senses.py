@@ -21,7 +21,7 @@ from policies.companion.senses.other_people import OtherPeople
 from policies.companion.senses.phone_check import PhoneCheck, PhoneFit, Suitor, Word
 from policies.companion.senses.poses import Pose, PoseHistory
 from policies.companion.senses.seen_owner import PersonNow, SeenOwner, Sight
-from policies.companion.vehicle_link import Own, Owner
+from policies.companion.telemetry import Own, Owner
 from policies.mono_depth.network import MonoDepth
 from policies.person_detector.detector import SURE, Detection, PersonDetector
 from policies.tasks.follow_me.observe import REPORT_LAG_S

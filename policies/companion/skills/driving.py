@@ -17,14 +17,15 @@ from common.attitude import Vector, yaw_of
 from common.range_sectors import GROUND_RING
 from common.warp_start import start_warp
 from policies.companion.decision_log import NO_GOAL
-from policies.companion.goals import Goal, Goals
 from policies.companion.guard.goal_guard import NoseGuard
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.ranges import Ranges
 from policies.companion.skills.goal_skill import GoalSkill
 from policies.companion.skills.skill import Floats, Velocity
+from policies.companion.telemetry import NEVER_US, Own
 from policies.companion.vector_pilot import DrivingPilot
-from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
+from policies.companion.vehicle_link import VehicleLink
+from policies.companion.where_to.goals import Goal, Goals
 from policies.tasks.drive.observe import (
     FRAME,
     SPEED_MAX_M_S,

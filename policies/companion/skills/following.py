@@ -25,9 +25,10 @@ from policies.companion.senses.image_fit import NO_IMAGES, OTHER_CLOCK, misfit
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.pace import Pace
 from policies.companion.skills.skill import Floats, Velocity
+from policies.companion.telemetry import Own, Owner
 from policies.companion.tracked_observer import TrackedObserver
 from policies.companion.tracked_recorder import RECORD_LAYOUT, TrackedRecorder
-from policies.companion.vehicle_link import Own, Owner, VehicleLink
+from policies.companion.vehicle_link import VehicleLink
 from policies.tasks.follow_me.observe import EGO_BLIND, TRACKED
 from policies.tasks.layout import Layout
 

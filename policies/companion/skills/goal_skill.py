@@ -11,15 +11,16 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from policies.companion.goals import Goals
 from policies.companion.guard.goal_guard import STANDING, GoalGuard, GoalStance
 from policies.companion.guard.interventions import BeginningReasons, Interventions
-from policies.companion.owner_goal import OwnerGoal
 from policies.companion.ranges import OLD_US, Ranges
 from policies.companion.skills.pace import Pace
 from policies.companion.skills.skill import Floats, Velocity
+from policies.companion.telemetry import NEVER_US, Own
 from policies.companion.vector_pilot import VectorPilot
-from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
+from policies.companion.vehicle_link import VehicleLink
+from policies.companion.where_to.goals import Goals
+from policies.companion.where_to.owner_goal import OwnerGoal
 from policies.tasks.layout import Layout
 
 GUARDED_OLD_US = 2_500_000  # the guard stands still before

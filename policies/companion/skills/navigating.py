@@ -17,18 +17,19 @@ from common.attitude import Vector
 from common.range_sectors import RANGES
 from common.warp_start import start_warp
 from policies.companion.decision_log import NO_GOAL
-from policies.companion.goals import Goals
 from policies.companion.guard.goal_guard import GoalGuard
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
 from policies.companion.observation import CommandKernel, write_own_row
-from policies.companion.owner_goal import OwnerGoal
 from policies.companion.ranges import Ranges
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.goal_skill import GoalSkill
 from policies.companion.skills.skill import Floats, Velocity
+from policies.companion.telemetry import Own
 from policies.companion.vector_pilot import NavigationPilot
-from policies.companion.vehicle_link import Own, VehicleLink
+from policies.companion.vehicle_link import VehicleLink
+from policies.companion.where_to.goals import Goals
+from policies.companion.where_to.owner_goal import OwnerGoal
 from policies.person_detector.detector import LOW_WEIGHTS, WEIGHTS, PersonDetector, shipped
 from policies.tasks.flight.own_state import OwnState
 from policies.tasks.navigate.observe import observe_rows

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from common.attitude import Vector
 from policies.companion.guard.interventions import Interventions
 from policies.companion.image_client import ImageSource
-from policies.companion.vehicle_link import Own, VehicleLink
+from policies.companion.telemetry import Own
+from policies.companion.vehicle_link import VehicleLink
 from policies.tasks.layout import Layout
 
 Floats = NDArray[np.float32]

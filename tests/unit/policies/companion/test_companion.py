@@ -16,7 +16,8 @@ from policies.companion.observation import CommandKernel
 from policies.companion.senses.image_fit import LENS, NO_IMAGES, OTHER_CLOCK, OTHER_LENS, OTHER_SIZE
 from policies.companion.skills.driving import DriveObserver
 from policies.companion.skills.following import IMAGE_OLD_US, Following
-from policies.companion.vehicle_link import COMPONENT, Own
+from policies.companion.telemetry import Own
+from policies.companion.vehicle_link import COMPONENT
 from policies.experts.follower import ScriptedFollower
 from policies.tasks.follow_me.observe import EGO, vector_elements
 

@@ -8,7 +8,8 @@ from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from common.range_sectors import GROUND_RING
 from policies.companion.ranges import Ranges
 from policies.companion.skills.driving import DriveObserver, how_far_off, is_taken
-from policies.companion.vehicle_link import Own, VehicleLink
+from policies.companion.telemetry import Own
+from policies.companion.vehicle_link import VehicleLink
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.drive.observe import FRAME, OWN_SIZE
 

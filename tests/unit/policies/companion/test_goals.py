@@ -10,9 +10,9 @@ from autopilot.mavlink.transport.links import memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from autopilot.mavlink.wire.convert import degrees_e7
 from common.geodesy import GeoPoint, geodetic_from_ned
-from policies.companion.goals import Goals
-from policies.companion.plan_download import PATIENCE_US, RENEW_US
 from policies.companion.vehicle_link import COMPONENT, VehicleLink
+from policies.companion.where_to.goals import Goals
+from policies.companion.where_to.plan_download import PATIENCE_US, RENEW_US
 
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
 STATION = (255, 190)

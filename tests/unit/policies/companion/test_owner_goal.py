@@ -8,9 +8,9 @@ import pytest
 from common.image_stream import ImageFrame
 from policies.companion.guard.guard import GOES_ON_S, SHORT_OF_M
 from policies.companion.guard.settings import GuardSettings
-from policies.companion.owner_goal import KEPT_M, OwnerGoal
 from policies.companion.senses.senses import Senses
-from policies.companion.vehicle_link import Own, Owner
+from policies.companion.telemetry import Own, Owner
+from policies.companion.where_to.owner_goal import KEPT_M, OwnerGoal
 from policies.person_detector.detector import Detection
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SHAPE, TILT_DEG
 from policies.tasks.navigate.walking_goal import CLOSING_HZ

@@ -6,7 +6,7 @@ import pytest
 
 from common.attitude import quat_of, rotated
 from policies.companion.owner_watch import OwnerWatch, sighting_of
-from policies.companion.vehicle_link import Own, Owner
+from policies.companion.telemetry import Own, Owner
 from policies.tracker import sighting_axes_ned
 
 NOBODY = Owner()

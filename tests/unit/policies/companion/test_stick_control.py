@@ -6,7 +6,7 @@ import pytest
 
 from policies.companion.engagement import Wish
 from policies.companion.stick_control import CENTRED_US, StickControl
-from policies.companion.vehicle_link import NEVER_US
+from policies.companion.telemetry import NEVER_US
 
 
 @pytest.fixture

@@ -9,7 +9,8 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.transport.links import memory_pair
 from autopilot.mavlink.wire.codec import encode
 from policies.companion.engagement import Wish
-from policies.companion.vehicle_link import COMPONENT, RANGE_OLD_US, VehicleLink
+from policies.companion.telemetry import RANGE_OLD_US
+from policies.companion.vehicle_link import COMPONENT, VehicleLink
 
 
 @pytest.fixture

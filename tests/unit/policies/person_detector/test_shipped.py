@@ -5,7 +5,7 @@ import pytest
 
 from common.image_stream import ImageFrame
 from policies.companion.senses.senses import Senses
-from policies.companion.vehicle_link import Own, Owner
+from policies.companion.telemetry import Own, Owner
 from policies.person_detector.detector import LOW_WEIGHTS, STRIDE, SURE, Detection, PersonDetector, shipped
 from policies.person_detector.scenes import scenes
 from policies.person_detector.training import is_sure

@@ -10,7 +10,7 @@ from policies.companion.guard.interventions import HEIGHT, NO_GNSS, OLD_TELEMETR
 from policies.companion.guard.settings import GuardSettings, guard_settings
 from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
-from policies.companion.vehicle_link import RANGE_OLD_US, Own, Owner
+from policies.companion.telemetry import RANGE_OLD_US, Own, Owner
 from policies.person_detector.detector import Detection
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, TILT_DEG
 

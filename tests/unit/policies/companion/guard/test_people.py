@@ -6,7 +6,7 @@ import pytest
 from policies.companion.guard.people import PeopleRule
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.seen_owner import PersonNow
-from policies.companion.vehicle_link import Own
+from policies.companion.telemetry import Own
 
 CHEST_M = 1.3
 

@@ -8,7 +8,7 @@ from policies.companion.guard.rollouts import Rollouts
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.local_map import CELL_M, LocalMap
 from policies.companion.senses.poses import Pose
-from policies.companion.vehicle_link import Own
+from policies.companion.telemetry import Own
 
 S = GuardSettings()
 LEVEL = (0.0, 0.0, 0.0, 1.0)

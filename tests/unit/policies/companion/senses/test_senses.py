@@ -5,7 +5,7 @@ import pytest
 
 from common.image_stream import ImageFrame
 from policies.companion.senses.senses import Senses
-from policies.companion.vehicle_link import Own, Owner
+from policies.companion.telemetry import Own, Owner
 from policies.person_detector.detector import Detection
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, TILT_DEG
 

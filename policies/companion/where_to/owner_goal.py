@@ -12,7 +12,6 @@ import numpy as np
 
 from autopilot.interface.vehicle_state import Severity
 from common.image_stream import ImageFrame
-from policies.companion.goals import Goal
 from policies.companion.guard.guard import GOES_ON_S, SHORT_OF_M
 from policies.companion.guard.limits import faded, stopping_speed
 from policies.companion.guard.settings import IMAGES_S, GuardSettings
@@ -20,7 +19,9 @@ from policies.companion.image_client import ImageSource
 from policies.companion.senses.image_fit import NO_IMAGES, OLD_IMAGES, OTHER_CLOCK, misfit
 from policies.companion.senses.seen_owner import PersonNow
 from policies.companion.senses.senses import Senses
-from policies.companion.vehicle_link import NEVER_US, VehicleLink
+from policies.companion.telemetry import NEVER_US
+from policies.companion.vehicle_link import VehicleLink
+from policies.companion.where_to.goals import Goal
 from policies.tasks.follow_me.observe import IMAGE_SHAPE
 from policies.tasks.navigate.walking_goal import CLOSING_HZ
 

@@ -10,7 +10,8 @@ from typing import Any
 from autopilot.interface.item_lists import MissionItem
 from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT
 from autopilot.mavlink.wire.item_messages import item_from_fields
-from policies.companion.vehicle_link import COMPONENT, NEVER_US, VehicleLink
+from policies.companion.telemetry import NEVER_US
+from policies.companion.vehicle_link import COMPONENT, VehicleLink
 
 RENEW_US = 5_000_000
 PATIENCE_US = 500_000  # for each answer

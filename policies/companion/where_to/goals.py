@@ -19,8 +19,8 @@ from autopilot.navigator.fence.fence_items import fence_shapes
 from autopilot.navigator.fence.fence_region import region_of
 from common.attitude import Vector
 from common.geodesy import ned_from_geodetic
-from policies.companion.plan_download import PlanDownload
 from policies.companion.vehicle_link import COMPONENT, VehicleLink
+from policies.companion.where_to.plan_download import PlanDownload
 
 YAW_MAX_RAD = 100.0  # some turn too often
 FAR_M = 1000.0  # guess: farther is a mistake

@@ -1,0 +1,1 @@
+"""Where a companion goes that goes to goals."""
