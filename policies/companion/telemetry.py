@@ -8,7 +8,7 @@ from common.attitude import Quat, Vector, rotated
 from common.geodesy import GeoPoint
 
 RANGE_OLD_US = 500_000  # a range measured longer ago tells nothing of the ground below
-GROUND_OLD_US = 5_000_000  # nor where that was, after so long; guess: 15 m of a walk's speed of terrain like before
+GROUND_OLD_US = 5_000_000  # nor where that was, after so long; guess
 NEVER_US = -(1 << 62)
 
 
