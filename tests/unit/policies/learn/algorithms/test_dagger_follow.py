@@ -1,5 +1,7 @@
 """DAgger on FollowMe itself: a small student comes to do what its teacher does, from images of a flight."""
 
+from statistics import median
+
 import pytest
 import torch
 
@@ -38,4 +40,4 @@ def test_student_of_follow_me_comes_to_do_what_its_teacher_does():
         seed=1,
     )
     losses = [student.iterate().statistics["Losses/Imitation Loss"] for _ in range(10)]
-    assert losses[-1] < 0.4 * losses[0]
+    assert median(losses[-5:]) < 0.4 * losses[0]  # of one round, whose episodes begin anew, it goes up and down
