@@ -10,6 +10,7 @@ from common.rotation import wrap_pi, yaw_from_quat
 from policies.tasks.flight.own_state import Command, OwnState
 from policies.tasks.flight.ranges import HULL_M, mark_round, mark_sectors
 from policies.tasks.follow_me.follow_me_params import FollowParams
+from policies.tasks.follow_me.observe import DECISION_S
 from policies.tasks.follow_me.owner_visibility import lens_in, reach_from
 from policies.tasks.follow_me.tracked.guarding import kept_from
 from policies.tasks.follow_me.tracked.keep_off import KeepOff
@@ -27,7 +28,7 @@ _WALKS_M_S = wp.constant(0.7)  # with depth who is slower is the map's, in fligh
 _LATELY_S = wp.constant(0.55)  # they are followed for so long after they were seen
 _SOLID_S = wp.constant(15.0)  # and their last place is solid for so long, or until an image shows it without them
 _NEVER_S = wp.constant(1.0e6)
-_DECISION_S = wp.constant(0.1)
+_DECISION_S = wp.constant(DECISION_S)
 _OTHERS = wp.constant(OTHERS)
 
 

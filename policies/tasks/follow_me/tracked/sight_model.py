@@ -12,13 +12,13 @@ from typing import Any
 import warp as wp
 
 from common.rng import draw_key
-from common.rotation import yaw_from_quat
+from common.rotation import wrap_pi, yaw_from_quat
 from policies.tasks.flight.flown_vehicle import own_state
 from policies.tasks.flight.own_state import Command, ned_from_level
 from policies.tasks.follow_me.cast import PEOPLE_MAX
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.image_way import Way
-from policies.tasks.follow_me.observe import TILT_DEG
+from policies.tasks.follow_me.observe import DECISION_S, TILT_DEG
 from policies.tasks.follow_me.owner_visibility import HALF_WIDTH, Sight
 from policies.tasks.follow_me.tracked.owner_filter import OwnerFilter, seen, waited
 from policies.tasks.follow_me.tracked.vector import REACH_M, SECTORS
@@ -31,7 +31,7 @@ OTHERS = PEOPLE_MAX - 1
 KEPT = wp.constant(10)  # sights on their way, as of pictures
 _SECTORS = wp.constant(SECTORS)
 _SECTOR_RAD = wp.constant(6.2831853 / float(SECTORS))
-_DECISION_S = wp.constant(0.1)
+_DECISION_S = wp.constant(DECISION_S)
 _STREAM = wp.constant(21)
 _EPISODE_STREAM = wp.constant(22)
 _ALONG_BIAS_M = wp.constant(0.05)  # standard deviation from episode to episode, with depth
@@ -174,9 +174,7 @@ def map_known(
     tracked.has_depth[i] = int(has_depth(n))
     reach_m = wp.where(has_depth(n), n.depth_max_m, REACH_M)
     for j in range(_SECTORS):
-        off = wp.abs(float(j) * _SECTOR_RAD - yaw)
-        off = wp.min(off, wp.abs(6.2831853 - off))
-        off = wp.min(off, wp.abs(off - 6.2831853))
+        off = wp.abs(wrap_pi(float(j) * _SECTOR_RAD - yaw))
         tracked.looked[i, j] = wp.where(off < HALF_VIEW_RAD, 0, tracked.looked[i, j] + 1)
     turn = int(wp.round(yaw / _SECTOR_RAD))
     for j in range(_SECTORS):
