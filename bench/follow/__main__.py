@@ -2,6 +2,7 @@
 
 Stages that are done (results/follow/STAGE-SEED.json) are kept and stopped ones go on; `--again` trains them anew,
 `--page` only writes the page, `--shipped` takes what the shipped page was made of (docs/results/follow.jsonl) as done.
+What is not trained here stays on the page as it is recorded there, with the commit that trained it.
 Policies stay in results/follow/; `--publish` puts them in the place of those that ship: of at least three seeds of a
 stage the one that is best in worlds of validation (`bench.follow.choice`). Whether it is better than what ships is
 not asked: look at the page first. Two processes go side by side, each on a core of its own; a stage waits for those it
@@ -53,8 +54,8 @@ def main(
     if unknown:
         console.print(f"follow: no stage {unknown[0]}; there are {', '.join(STAGES)}", markup=False)
         raise typer.Exit(2)
-    recorded = read_all(RUNS) if shipped else []
-    for result in recorded:
+    recorded = read_all(RUNS) if RUNS.exists() else []
+    for result in recorded if shipped else []:
         _take(result, RESULTS)
     failed: list[str] = []
     if not page:
@@ -86,8 +87,8 @@ def results(recorded: Sequence[Result] = ()) -> dict[str, list[Result]]:
 def _take(result: Result, folder: Path) -> None:
     """Takes a result as done, with its policy where that ships; not without, where something still needs the policy."""
     path, stage = result_path(folder, result.stage, result.seed), STAGES[result.stage]
-    shipped = PRETRAINED / f"{stage.recipe}.pt"
-    is_there = result.seed == 1 and shipped.exists()
+    shipped = PRETRAINED / stage.file_name
+    is_there = stage.ships and result.seed == 1 and shipped.exists()
     is_needed = any(stage.name in other.before for other in STAGES.values())
     if path.exists() or (not is_there and (is_needed or (stage.flies and not result.cards(is_flown=True)))):
         return
@@ -106,7 +107,7 @@ def published(results_folder: Path, pretrained: Path, choose: Choose = best_of) 
     """
     lines = []
     for stage, trained in _trained(results_folder):
-        ships = pretrained / f"{stage.recipe}.pt"
+        ships = pretrained / stage.file_name
         if len(trained) < SEEDS:
             lines.append(f"{ships.name}: stays: of {stage.name} {len(trained)} of the {SEEDS} seeds are trained")
             continue
@@ -122,7 +123,7 @@ def unpublished(results_folder: Path, pretrained: Path) -> list[str]:
     """A line for each stage of whose policies none is the one that ships, which stays."""
     lines = []
     for stage, trained in _trained(results_folder):
-        ships = pretrained / f"{stage.recipe}.pt"
+        ships = pretrained / stage.file_name
         if not any(_is_same(path, ships) for path in trained):
             how = "--publish" if len(trained) >= SEEDS else f"--publish asks for {SEEDS} seeds"
             lines.append(f"{', '.join(map(str, trained))}: not {ships.name}, which still ships: {how}")

@@ -39,12 +39,12 @@ def with_entries(text: str, entries: Sequence[Entry]) -> str:
 
 def _tables(order: Sequence[Entry]) -> str:
     ranks = [_rank(place, entry, order[0]) for place, entry in enumerate(order, 1)]
-    who = [(entry.name, f"`{entry.policy}`", entry.sees, entry.made) for entry in order]
+    who = [(e.name, f"`{e.policy}`", e.sees, e.made, e.commit[:8] or "not kept") for e in order]
     return "\n".join(
         [
             markdown(("", "policy", "in band, mean", "behind the first", "no collision", *TITLES), ranks),
             "Who they are:\n",
-            markdown(("policy", "`--policy`", "sees", "how it came to be"), who),
+            markdown(("policy", "`--policy`", "sees", "how it came to be", "flown at"), who),
             "Flights that ended in a collision, those with people in brackets, and decisions that the guard changed:\n",
             markdown(("policy", *TITLES, "changed / min"), [_hits(entry) for entry in order]),
         ]

@@ -49,6 +49,7 @@ class Entry:
     made: str  # by whom or what, on what, for how long
     flights: Mapping[str, tuple[Flown, ...]]
     """By condition, in the order of SEEDS."""
+    commit: str = ""  # of the code that flew it: guard, senses, vehicle
 
     def figure(self, name: str) -> NDArray[np.float64]:
         """A figure of all flights, shape (conditions, seeds)."""
@@ -102,7 +103,9 @@ def entry_from(record: Mapping[str, Any], name: str, sees: str, made: str) -> En
         seeds = tuple(flown["seed"] for flown in flights[key])
         if seeds != SEEDS:
             raise EntryError(f"flights.json: {key}: seeds {seeds}, wanted {SEEDS}")
-    return _parsed({"name": name, "policy": record["policy"], "sees": sees, "made": made, "flights": flights})
+    commit = record.get("code", {}).get("commit", "")
+    policy = record["policy"]
+    return _parsed({"name": name, "policy": policy, "sees": sees, "made": made, "flights": flights, "commit": commit})
 
 
 def read_rows(path: Path = ROWS) -> list[Entry]:
@@ -120,7 +123,7 @@ def write_rows(entries: Iterable[Entry], path: Path = ROWS) -> None:
 
 def _parsed(raw: Mapping[str, Any]) -> Entry:
     flights = {key: tuple(_flown(flown) for flown in raw["flights"][key]) for key in CONDITIONS}
-    return Entry(raw["name"], raw["policy"], raw["sees"], raw["made"], flights)
+    return Entry(raw["name"], raw["policy"], raw["sees"], raw["made"], flights, raw.get("commit", ""))
 
 
 def _flown(raw: Mapping[str, Any]) -> Flown:

@@ -136,6 +136,7 @@ def _training(results: Results, docs: Path) -> str:
         "decisions/s",
         "seeds",
         "file",
+        "at",
     )
     lines = ["## What training takes", "", f"| {' | '.join(columns)} |", f"|{'---|' * len(columns)}"]
     for stage in STAGES.values():
@@ -149,7 +150,8 @@ def _training(results: Results, docs: Path) -> str:
         limit = "" if stage.limit_s is None else duration(stage.limit_s)
         lines.append(
             f"| {stage.title} | {first.steps / 1e6:.2f} M | {first.cores} | {duration(seconds)} | {duration(whole)} "
-            f"| {limit} | {first.steps_per_s:,.0f} | {len(runs)} | {first.policy_bytes / 1024:,.0f} kB |"
+            f"| {limit} | {first.steps_per_s:,.0f} | {len(runs)} | {first.policy_bytes / 1024:,.0f} kB "
+            f"| {first.commit[:8] or 'not kept'} |"
         )
     for reward, name in REWARDS.items():
         drawn = {stage.title: results.get(stage.name, ()) for stage in STAGES.values() if stage.reward == reward}

@@ -37,6 +37,7 @@ class Result:
     policy_bytes: int
     curve: list[Point]
     judged: list[Judged]
+    commit: str = ""  # of the code that trained it; none: of before this was kept
 
     @property
     def steps_per_s(self) -> float:

@@ -68,7 +68,7 @@ def run(stage: Stage, seed: int, folder: Path) -> Result:
     result = train(config, curve)
     kept = policy_path(folder, stage.name, seed)
     save_policy(kept, *load_policy(result.policy), is_half=True)
-    policy, _ = load_policy(kept)  # judged and flown as it ships
+    policy, card = load_policy(kept)  # judged and flown as it ships
     return Result(
         stage.name,
         seed,
@@ -79,6 +79,7 @@ def run(stage: Stage, seed: int, folder: Path) -> Result:
         kept.stat().st_size,
         curve.points,
         judge_in_batch(policy, settings.model_copy(update=stage.judged)),
+        card.code["commit"],
     )
 
 

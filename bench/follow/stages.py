@@ -34,6 +34,7 @@ class Stage:
     takes_all: bool = False  # its training is given all cores
     flies: bool = False  # also judged in flights over MAVLink
     ships: bool = True  # with --publish the best seed's policy goes to policies/pretrained/
+    ships_as: str = ""  # under this name; the recipe's, if none
     is_chosen_as_drawn: bool = False  # the best seed is chosen in the conditions of training, not in the preset's
     document: str = "not reported"
     limit_s: float | None = None  # wall clock at most, with all stages before it
@@ -44,6 +45,11 @@ class Stage:
     def before(self) -> tuple[str, ...]:
         """Stages that must be done first."""
         return tuple(name for name in (self.teacher, self.start) if name is not None)
+
+    @property
+    def file_name(self) -> str:
+        """Of the policy that ships."""
+        return f"{self.ships_as or self.recipe}.pt"
 
 
 STAGES: dict[str, Stage] = {
@@ -99,10 +105,18 @@ STAGES: dict[str, Stage] = {
         ),
         Stage(
             "tracked",
-            "Tracked: that student goes on by PPO",
+            "Tracked, then: that student goes on by PPO",
             "follow-me-tracked",
             start="tracked-student",
+            ships=False,
+        ),
+        Stage(
+            "tracked-wide",
+            "Tracked: goes on by PPO with the flight controller's estimate, rough sensors, three airframes",
+            "follow-me-tracked-wide",
+            start="tracked",
             flies=True,
+            ships_as="follow-me-tracked",
             limit_s=3600.0,
             targets=(0.98, 0.95),
         ),

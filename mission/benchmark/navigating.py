@@ -28,6 +28,7 @@ from sim.wind import wind_model
 from sim.world.forest_world import FOREST
 
 GOAL_MIN_M, GOAL_HEIGHT_M = 60.0, 2.0  # of the task
+LEAST_SPEED_M_S = 5.0  # mean of the flights that arrive
 TAKEOFF_S, SETTLE_S = 40.0, 2.0
 COLUMNS = (
     "condition", "flights", "reached", "collided", "over the forest", "mean speed", "rests off the goal",
@@ -131,6 +132,9 @@ def _misses(name: str, crossings: Sequence[Crossing]) -> list[str]:
     forest, count, found = CONDITIONS[name], len(crossings), []
     reached = sum(crossing.outcome == "arrived" for crossing in crossings)
     collided = sum(crossing.outcome == "collision" for crossing in crossings)
+    speeds_m_s = [crossing.speed_m_s for crossing in crossings if crossing.outcome == "arrived"]
+    if speeds_m_s and np.mean(speeds_m_s) < LEAST_SPEED_M_S:
+        found.append(f"{forest.title}: {np.mean(speeds_m_s):.2f} m/s on the way, wanted {LEAST_SPEED_M_S:g}")
     if reached < forest.least_reached * count:
         found.append(f"{forest.title}: {reached} of {count} goals reached, wanted {forest.least_reached:.0%}")
     if collided > forest.most_collided * count:

@@ -21,6 +21,7 @@ from mission.console.option_checks import UserError
 from mission.console.terminal import print_line
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.pilot import PilotError
+from policies.learn.export.provenance import code_record
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,15 +158,18 @@ def _rows(benchmark: Benchmark, outcomes: dict[str, list[Any]]) -> list[tuple[st
 
 
 def _page(benchmark: Benchmark, outcomes: dict[str, list[Any]]) -> str:
-    """The table, and below it what was missed."""
+    """The table, with the names of conditions that --condition takes, and below it what was missed."""
     missed = _misses(benchmark, outcomes)
     below = "".join(f"- {text}\n" for text in missed)
-    return markdown(benchmark.columns, _rows(benchmark, outcomes)) + (f"\nMissed:\n\n{below}" if missed else "")
+    named = zip(outcomes, _rows(benchmark, outcomes), strict=True)
+    rows = [(f"{cells[0]}: `{name}`", *cells[1:]) for name, cells in named]
+    return markdown(benchmark.columns, rows) + (f"\nMissed:\n\n{below}" if missed else "")
 
 
 def _write(out: Path, options: BenchmarkOptions, benchmark: Benchmark, outcomes: dict[str, list[Any]]) -> None:
     write_whole(out / "table.md", _page(benchmark, outcomes).encode())
     flown = {name: [asdict(outcome) for outcome in found] for name, found in outcomes.items()}
     record = {name: getattr(options, name) for name in ("task", "policy", "seed")}
-    record |= {"has_guard": options.guard.is_on, "guard_settings": options.guard.changed, "flights": flown}
+    record |= {"has_guard": options.guard.is_on, "guard_settings": options.guard.changed}
+    record |= {"code": code_record(), "flights": flown}
     write_whole(out / "flights.json", (json.dumps(record, indent=1) + "\n").encode())

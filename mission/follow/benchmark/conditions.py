@@ -64,6 +64,14 @@ CONDITIONS = (
     Condition("gone", "owner gone for good", "walk", _GONE, None, 1.5),
     Condition("gone-silent", "owner gone for good, phone silent", "walk", {**_GONE, **_SILENT}, None, 1.5),
     Condition("gone-run", "owner gone for good, running", "run", _GONE, None, 1.5),
+    Condition(
+        "gone-3-run-silent",
+        "owner not to be seen for 3 s, running, phone silent",
+        "run",
+        {**_HIDDEN_3_S, **_SILENT},
+        None,
+        1.5,
+    ),
     Condition("crossed", "three others cross the way", "walk", {"bystanders": 3.0}, 0.95),
     Condition(
         "twins", "three others in the owner's clothes", "walk", {"bystanders": 3.0, "bystander_likeness": 1.0}, 0.95

@@ -92,15 +92,15 @@ def test_policies_that_ship_stay_unless_new_ones_are_published(tmp_path):
     old, new, same = (shipped(name) for name in ("follow-me-late", "follow-me-tracked", "follow-me-teacher"))
     (ships / "follow-me-tracked.pt").write_bytes(old)
     (ships / "follow-me-teacher.pt").write_bytes(same)
-    made = {"tracked": new, "teacher": same, "tuned": old}
+    made = {"tracked-wide": new, "teacher": same, "tuned": old}
     for name, content in made.items():
         for seed in (1, 2, 3):
             (results / f"{name}-{seed}.pt").write_bytes(content)
     (line,) = unpublished(results, ships)
-    assert line.endswith(f"{results / 'tracked-3.pt'}: not follow-me-tracked.pt, which still ships: --publish")
+    assert line.endswith(f"{results / 'tracked-wide-3.pt'}: not follow-me-tracked.pt, which still ships: --publish")
     assert (ships / "follow-me-tracked.pt").read_bytes() == old
     lines = published(results, ships, second)
-    assert f"follow-me-tracked.pt: ships now what lies in {results / 'tracked-2.pt'}" in lines
+    assert f"follow-me-tracked.pt: ships now what lies in {results / 'tracked-wide-2.pt'}" in lines
     assert {path.name for path in ships.iterdir()} == {"follow-me-tracked.pt", "follow-me-teacher.pt"}
     assert not unpublished(results, ships)
 

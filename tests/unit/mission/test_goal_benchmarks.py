@@ -20,6 +20,7 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.pilot import PilotError
 from policies.companion.vector_pilot import DrivingPilot, NavigationPilot
 from policies.datasets.reader import DatasetReader
+from policies.learn.export.provenance import code_record
 from policies.pretrained.pretrained_policies import pretrained
 
 
@@ -74,6 +75,8 @@ def test_a_flight_is_shown_and_written(task, condition, seed, tmp_path):
     assert outcome["outcome"] in {"arrived", "there"}
     assert (record["task"], record["has_guard"], record["guard_settings"]) == (task, True, {"crown_m": 0.9})
     assert (out / "table.md").read_text().startswith("| condition |")
+    assert f": `{condition}` |" in (out / "table.md").read_text()
+    assert record["code"] == code_record()
 
 
 @pytest.mark.parametrize(
@@ -160,6 +163,9 @@ def test_what_fell_short_is_named():
     good, bad = Crossing(1, "arrived", 5.0, 1.0, ""), Crossing(3, "collision", nan, 20.0, "")
     assert misses("navigate", {"400-late-0": [good]}) == []
     assert len(misses("navigate", {"400-late-0": [good, bad]})) == 2
+    slow = Crossing(5, "arrived", 4.9, 1.0, "")
+    (line,) = misses("navigate", {"400-late-0": [slow]})
+    assert line.endswith("4.90 m/s on the way, wanted 5")
     there, touched = Parking(1, "there", 9.0, 0.1, 2.0, 0.0, ""), Parking(3, "touched", 3.0, 2.0, 40.0, 0.0, "")
     assert misses("park", {"calm": [there]}) == []
     assert len(misses("park", {"calm": [there, touched]})) == 2
