@@ -38,31 +38,49 @@ def watched_flight(planned_s=SECONDS, **config):
 def watched():
     """Six seconds of a flight that follows, and what was true at each sample."""
     flight, watch = watched_flight()
-    distances = []
+    distances, motion = [], []
 
     def is_over(_):
         watch.frame()
         if watch.sample_count > len(distances):
             pos = flight.rig.rows["truth"][0]["pos_ned"]
             distances.append(dist(tuple(map(float, pos)), flight.owner.chest_ned))
+            motion.append(_motion(flight))
         return watch.is_over
 
     flight.run(is_over)
-    return watch.track(), distances
+    return watch, distances, motion
+
+
+def _motion(flight):
+    """True velocity north and east [m/s], and yaw rate [deg/s]."""
+    truth = flight.rig.rows["truth"][0]
+    return (*truth["vel_ned"][:2].tolist(), float(np.degrees(truth["omega_frd"][2])))
 
 
 def test_samples_are_as_many_as_decisions_and_true(watched):
-    track, distances = watched
+    watch, distances, _ = watched
+    track = watch.track()
     assert len(track.time_s) == 60
     assert track.is_whole
     assert track.distance_m == pytest.approx(distances, abs=1e-3)
 
 
 def test_a_follower_sees_its_owner_ahead_and_touches_nothing(watched):
-    track, _ = watched
+    track = watched[0].track()
     assert track.is_in_view.mean() > 0.8
     assert abs(track.bearing_rad).mean() < 0.5
     assert not track.is_collided.any()
+
+
+def test_how_smoothly_it_flew_is_the_rms_of_true_acceleration_and_yaw_rate(watched):
+    watch, _, motion = watched
+    north, east, yaw_rate = np.array(motion).T
+    accel = np.hypot(np.diff(north), np.diff(east)) / 0.1
+    smoothness = watch.smoothness()
+    assert smoothness.accel_rms == pytest.approx(np.sqrt(np.mean(accel**2)), rel=1e-3)
+    assert smoothness.yaw_rate_rms == pytest.approx(np.sqrt(np.mean(yaw_rate**2)), rel=1e-3)
+    assert 0.1 < smoothness.accel_rms < 5.0
 
 
 def test_a_touch_softer_than_the_ground_at_take_off_is_a_collision():
