@@ -62,6 +62,18 @@ FEW_GOALS = (
         "",
         {"behavior.reward_signals.gail.strength": 0.05},
     ),
+    _gail_goals(
+        "parking1-goals-gail-even",
+        "the same, GAIL as strong as the task",
+        "",
+        {"behavior.reward_signals.gail.strength": 1.0},
+    ),
+    _gail_goals(
+        "parking1-goals-gail-alone",
+        "three goals, GAIL alone",
+        "",
+        {"behavior.reward_signals.gail.strength": 1.0, "behavior.reward_signals.extrinsic.strength": 0.0},
+    ),
     _few_goals("parking1-goals-cloning", "three goals, cloning alone", "", {}, _CLONING),
     _few_goals("parking1-goals-both", "three goals, starts and blocks anywhere", "", _ANYWHERE),
     _few_goals(
