@@ -69,7 +69,7 @@ class TrackedObserver:
         senses = self._senses
         write_own_row(self._own[0], own)
         self._age_s[0] = image_age_s
-        self._has_depth[0] = int(senses.image_us > 0)  # measured, or by colours
+        self._has_depth[0] = int(senses.map.has_depth)  # measured, not told from colours
         near_m = senses.map.nearest_m(own.pos_ned, yaw_of(own.q_ned_from_frd), own.boot_us)
         self._nearness[0] = np.clip(1.0 - near_m / float(REACH_M), 0.0, 1.0)
         self._inputs[3] = senses.seen.at(own.boot_us)
