@@ -25,19 +25,18 @@ def test_the_page_is_what_its_recorded_runs_say():
 
 def test_what_the_page_says_of_the_strength_of_imitation_is_what_was_trained():
     runs, text = recorded(), " ".join((DOCS / "cars.md").read_text(encoding="utf-8").split())
-    weak, strong = (f"parking1-goals-gail{kind}" for kind in ("", "-strong"))
-    strengths = [
-        configured(EXPERIMENTS[name], 1, "runs").behavior.reward_signals.gail.strength
-        for name in ("parking1-gail", weak, strong)
-    ]
-    assert strengths == [0.002, 0.002, 0.05]
-    found = [
-        [run.evaluations[0].successes == run.evaluations[0].episodes for run in runs[name]] for name in (weak, strong)
-    ]
-    assert [sum(each) for each in found] == [4, 5]
-    assert "by five seeds of five with 0.05, and by four with 0.002" in text
+    rows = [f"parking1-goals-gail{kind}" for kind in ("", "-strong", "-even", "-alone")]
+    signals = [configured(EXPERIMENTS[name], 1, "runs").behavior.reward_signals for name in ("parking1-gail", *rows)]
+    assert [each.gail.strength for each in signals] == [0.002, 0.002, 0.05, 1.0, 1.0]
+    assert [each.extrinsic.strength for each in signals] == [1.0, 1.0, 1.0, 1.0, 0.0]
+    found = [[run.evaluations[0].successes == run.evaluations[0].episodes for run in runs[name]] for name in rows]
+    assert [sum(each) for each in found] == [4, 5, 4, 3]
+    assert (
+        "are all found by four seeds of five with 0.002, by five with 0.05, by four with 1, as much as the task pays,"
+        " and by three with GAIL alone" in text
+    )
     on_goals, drawn, on_new = (
-        100.0 * np.mean([getattr(run.evaluations[k], count) / run.evaluations[k].episodes for run in runs[weak]])
+        100.0 * np.mean([getattr(run.evaluations[k], count) / run.evaluations[k].episodes for run in runs[rows[0]]])
         for k, count in ((0, "successes"), (0, "drawn_successes"), (1, "successes"))
     )
     assert f"{on_goals:.0f} % on those goals, {drawn:.0f} % with drawn actions, {on_new:.0f} % on new spots" in text
