@@ -250,7 +250,9 @@ class Guard:
         """The velocity without what brings it too near to anybody who was seen, and what it has to do with them."""
         owner, people = self.senses.owner_now(own), self.senses.others_now(own)
         everybody = people if owner is None else [owner, *people]
-        kept, near = self._people.bound(level, own, everybody, passes_over=self.stance is Stance.SEARCH)
+        kept, near = self._people.bound(
+            level, own, everybody, has_depth=self.senses.map.has_depth, passes_over=self.stance is Stance.SEARCH
+        )
         self._is_too_near = any(person.then_m < self.settings.owner_m for person in near)
         self._sinking_max = min((person.sinking_max for person in near), default=inf)
         self._count(NEAR_SOMEBODY, level, kept)

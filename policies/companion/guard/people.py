@@ -55,7 +55,7 @@ class PeopleRule:
         self._launch: Any = wp.launch(keep_off_all, 1, [rule, asked, people, kept, out], record_cmd=True)
 
     def bound(
-        self, level: Floats, own: Own, people: Sequence[PersonNow], *, passes_over: bool
+        self, level: Floats, own: Own, people: Sequence[PersonNow], *, has_depth: bool, passes_over: bool
     ) -> tuple[Floats, list[Somebody]]:
         """The velocity [m/s] without what is too fast towards anybody, and what it has to do with each, the first 16.
 
@@ -63,10 +63,11 @@ class PeopleRule:
             level: north and east.
             own: telemetry.
             people: as they are by now.
+            has_depth: ranges are measured, not told from looks.
             passes_over: it keeps its height: whoever is far enough below does not count.
         """
         here, count = np.array(own.pos_ned[:2]), min(len(people), MOST)
-        self._asked[0] = (level, own.vel_ned, count, passes_over)
+        self._asked[0] = (level, own.vel_ned, count, has_depth, passes_over)
         for row, known in zip(self._people, people, strict=False):
             silence_s, over_m = min(known.silence_s, _SILENCE_MAX_S), float(known.pos_ned[2]) - own.pos_ned[2]
             row["way"], row["vel"], row["vel_var"] = known.pos_ned[:2] - here, known.vel, known.vel_var

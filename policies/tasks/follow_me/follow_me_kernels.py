@@ -240,8 +240,8 @@ def asked(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState
     if state.params[i].guard == 1.0:
         own = own_state(rig, i, rules.has_estimator)
         age_s = state.image_ages_s[i]
-        command = guarded(command, own, state.tracked.filters[i], age_s, rules.keep_off)
         people, tracked = state.drawn, state.tracked
+        command = guarded(command, own, tracked.filters[i], age_s, tracked.has_depth[i], rules.keep_off)
         command = kept_from_others(command, own, rig.truth[i], people, tracked, age_s, rules.keep_off, i)
     state.tracked.before[i] = state.tracked.commands[i]
     state.tracked.commands[i] = command

@@ -143,5 +143,6 @@ def kept_from_others(
         walks = wp.length(other.vel_ned) > _WALKS_M_S or tracked.has_depth[i] == 0
         if other.stature_m > 0.0 and age_s < _LATELY_S and walks:
             vel = wp.vec2(other.vel_ned[0], other.vel_ned[1])
-            command = kept_from(command, own, chest_ned(other) - truth.pos_ned, vel, _VEL_STD_M_S, age_s, k)
+            way = chest_ned(other) - truth.pos_ned
+            command = kept_from(command, own, way, vel, _VEL_STD_M_S, age_s, tracked.has_depth[i], k)
     return command

@@ -26,11 +26,18 @@ _IMAGE_SLOW_S, _IMAGE_STOP_S = wp.constant(IMAGE_SLOW_S), wp.constant(IMAGE_STOP
 
 @wp.func
 def kept_from(
-    command: Command, own: OwnState, way: wp.vec3, vel: wp.vec2, vel_std: float, age_s: float, k: KeepOff
+    command: Command,
+    own: OwnState,
+    way: wp.vec3,
+    vel: wp.vec2,
+    vel_std: float,
+    age_s: float,
+    has_depth: int,
+    k: KeepOff,
 ) -> Command:
     """What is flown of a command near somebody whose chest lies that way [m], seen so long ago."""
     level_way = wp.vec2(way[0], way[1])
-    b = bounds(k, level_way, own.vel_ned, vel, vel_std, age_s, way[2])
+    b = bounds(k, level_way, own.vel_ned, vel, vel_std, age_s, way[2], has_depth)
     level = kept_off(wp.vec2(command.vel_ned[0], command.vel_ned[1]), level_way, b.closing_max)
     command.vel_ned = wp.vec3(level[0], level[1], wp.min(command.vel_ned[2], b.sinking_max))
     return command
@@ -43,7 +50,9 @@ def faded(age_s: float, slow_s: float, stop_s: float) -> float:
 
 
 @wp.func
-def guarded(command: Command, own: OwnState, owner: OwnerFilter, image_age_s: float, k: KeepOff) -> Command:
+def guarded(
+    command: Command, own: OwnState, owner: OwnerFilter, image_age_s: float, has_depth: int, k: KeepOff
+) -> Command:
     """What is flown of a command, the newest image being so old."""
     command.vel_ned = faded(image_age_s, _IMAGE_SLOW_S, _IMAGE_STOP_S) * command.vel_ned
     if owner.is_known == 0:
@@ -51,4 +60,4 @@ def guarded(command: Command, own: OwnState, owner: OwnerFilter, image_age_s: fl
     command.vel_ned = faded(owner.age_s, _SLOW_S, _STOP_S) * command.vel_ned
     way = place_now(owner) - own.pos_ned
     std = std_along(owner.both.vel_var, wp.vec2(way[0], way[1]))
-    return kept_from(command, own, way, velocity_now(owner), std, owner.age_s, k)
+    return kept_from(command, own, way, velocity_now(owner), std, owner.age_s, has_depth, k)

@@ -20,7 +20,7 @@ REACTION_S = 0.25  # from a setpoint to the motion, besides the age of the pictu
 ESCAPE_CLIMB_M_S = 2.5  # nearer than allowed, until it is over their head
 OVER_M = wp.constant(1.45)  # so far above their chest it is
 _OVER_GAIN = wp.constant(2.0)  # [1/s]
-_LATE_S = wp.constant(0.15)  # with older pictures than this
+_LATE_S = wp.constant(0.15)  # with older pictures than this, or ranges that are told from looks
 _HIGH_M = wp.constant(1.0)  # it stays so far above the chest of who is near, from where it is soon over their head
 _HIGH_WITHIN_M = wp.constant(4.0)
 _RISE_M_S = wp.constant(0.8)
@@ -129,19 +129,21 @@ def kept_off(velocity: wp.vec2, way: wp.vec2, most: float) -> wp.vec2:
 
 
 @wp.func
-def sinking_max(k: KeepOff, over_m: float, then_m: float, closing: float, coming: float, age_s: float) -> float:
+def sinking_max(
+    k: KeepOff, over_m: float, then_m: float, closing: float, coming: float, age_s: float, has_depth: int
+) -> float:
     """How fast it may sink [m/s]; negative: it has to climb, over who can be given way to no more.
 
     That is who is within the way by which they come nearer until it goes as fast as they do, braking as it is taken to;
     or, since trees may end its way back, within what they go in a third of a second.
 
     So far above their chest [m], and so near [m], both by when it answers; they come nearer to each other, and come at
-    it [m/s]; seen so long ago [s].
+    it [m/s]; seen so long ago [s], how far away by depth or by their looks.
     """
     nearing, coming = wp.max(closing, 0.0), wp.max(coming, 0.0)
     if then_m < k.owner_m + wp.max(0.5 * nearing * nearing / k.brake, _CLIMBS_S * coming):
         return wp.max(_OVER_GAIN * (over_m - OVER_M), -k.escape_climb)
-    if then_m < _HIGH_WITHIN_M and age_s > _LATE_S:
+    if then_m < _HIGH_WITHIN_M and (age_s > _LATE_S or has_depth == 0):
         return wp.max(_OVER_GAIN * (over_m - _HIGH_M), -_RISE_M_S)
     return 100.0
 
@@ -157,7 +159,14 @@ class Bounds:
 
 @wp.func
 def bounds(
-    k: KeepOff, way: wp.vec2, own_vel: wp.vec3, other_vel: wp.vec2, vel_std: float, age_s: float, over_m: float
+    k: KeepOff,
+    way: wp.vec2,
+    own_vel: wp.vec3,
+    other_vel: wp.vec2,
+    vel_std: float,
+    age_s: float,
+    over_m: float,
+    has_depth: int,
 ) -> Bounds:
     """All of the rule, of who was seen so long ago; as `closing_max` is asked, with a velocity in ned."""
     b = Bounds()
@@ -168,7 +177,9 @@ def bounds(
     b.then_m = distance_then(way, level, other_vel, k.reaction_s, age_s)
     unit = unit_of(way)
     closing, coming = wp.dot(level - other_vel, unit), -wp.dot(other_vel, unit)
-    b.sinking_max = sinking_max(k, over_m - lost_m, b.then_m, closing, coming, age_s)  # but to climb no farther
+    b.sinking_max = sinking_max(
+        k, over_m - lost_m, b.then_m, closing, coming, age_s, has_depth
+    )  # but to climb no farther
     return b
 
 
@@ -190,6 +201,7 @@ class Asked:
     level: wp.vec2  # [m/s]
     own_vel: wp.vec3  # [m/s], ned
     people: int
+    has_depth: int  # ranges are measured
     passes_over: wp.bool  # it keeps its height, and who is far enough below is in nobody's way
 
 
@@ -206,7 +218,7 @@ def keep_off_all(
     level = a.level
     for i in range(a.people):
         p = people[i]
-        b = bounds(k, p.way, a.own_vel, p.vel, std_along(p.vel_var, p.way), p.age_s, p.over_m)
+        b = bounds(k, p.way, a.own_vel, p.vel, std_along(p.vel_var, p.way), p.age_s, p.over_m, a.has_depth)
         out[i] = b
         if not (a.passes_over and p.over_m >= OVER_M):
             level = kept_off(level, p.way, b.closing_max)

@@ -16,7 +16,8 @@ def closing_max(height_m: float, vertical: float) -> float:
     own = Own(boot_us=0, pos_ned=(0.0, 0.0, -height_m), vel_ned=(0.0, 0.0, vertical), range_m=height_m)
     sure = 0.01 * np.eye(2)
     somebody = PersonNow(np.array([2.3, 0.0, -CHEST_M]), sure, np.zeros(2), sure, 0.0)
-    level, (bound,) = PeopleRule(GuardSettings()).bound(np.array([9.0, 0.0]), own, [somebody], passes_over=False)
+    asked = np.array([9.0, 0.0])
+    level, (bound,) = PeopleRule(GuardSettings()).bound(asked, own, [somebody], has_depth=True, passes_over=False)
     assert level[0] == pytest.approx(bound.closing_max)
     return bound.closing_max
 

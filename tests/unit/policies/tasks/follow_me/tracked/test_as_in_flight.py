@@ -26,7 +26,7 @@ def guarded_rows(
     commands: wp.array(dtype=Command),
 ) -> None:
     i = wp.tid()
-    commands[i] = guarded(commands[i], own[i], owners[i], ages_s[i], k)
+    commands[i] = guarded(commands[i], own[i], owners[i], ages_s[i], 1, k)
 
 
 @wp.kernel

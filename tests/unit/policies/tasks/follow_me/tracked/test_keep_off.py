@@ -134,7 +134,7 @@ def sinks(far_m: float, own: tuple[float, float, float], other: float, over_m: f
     along, aside = np.array([0.6, -0.8]), np.array([0.8, 0.6])
     level = own[0] * along + own[1] * aside
     own_vel, other_vel = wp.vec3(*level, own[2]), wp.vec2(*(other * along))
-    return float(bounds(RULE, wp.vec2(*(far_m * along)), own_vel, other_vel, 0.0, 0.1, over_m).sinking_max)
+    return float(bounds(RULE, wp.vec2(*(far_m * along)), own_vel, other_vel, 0.0, 0.1, over_m, 1).sinking_max)
 
 
 def test_nearer_than_allowed_it_climbs_until_it_is_over_them() -> None:
@@ -182,18 +182,25 @@ def test_who_climbs_over_somebody_is_soon_over_them_and_goes_little_farther() ->
 def test_height_that_it_is_losing_is_none_to_keep_off_by_and_none_that_it_gains_yet() -> None:
     def keeps(down: float) -> float:
         vel = wp.vec3(0.0, 0.0, down)
-        return float(bounds(RULE, wp.vec2(1.2, 0.0), vel, wp.vec2(0.0, 0.0), 0.0, 0.1, 1.2).closing_max)
+        return float(bounds(RULE, wp.vec2(1.2, 0.0), vel, wp.vec2(0.0, 0.0), 0.0, 0.1, 1.2, 1).closing_max)
 
     assert keeps(1.0) < keeps(0.0)
     assert keeps(-1.0) == keeps(0.0)
 
 
 def test_with_late_pictures_it_stays_over_the_chest_of_who_is_near_from_where_it_is_soon_over_their_head() -> None:
-    assert float(sinking_max(RULE, 0.3, 2.0, 0.0, 0.0, 0.2)) < -0.5
-    assert float(sinking_max(RULE, 1.0, 2.0, 0.0, 0.0, 0.2)) == pytest.approx(0.0, abs=1e-6)
-    assert float(sinking_max(RULE, 2.0, 2.0, 0.0, 0.0, 0.2)) > 1.0
-    assert float(sinking_max(RULE, 0.3, 5.0, 0.0, 0.0, 0.2)) > 10.0
-    assert float(sinking_max(RULE, 0.3, 2.0, 0.0, 0.0, 0.1)) > 10.0
+    assert float(sinking_max(RULE, 0.3, 2.0, 0.0, 0.0, 0.2, 1)) < -0.5
+    assert float(sinking_max(RULE, 1.0, 2.0, 0.0, 0.0, 0.2, 1)) == pytest.approx(0.0, abs=1e-6)
+    assert float(sinking_max(RULE, 2.0, 2.0, 0.0, 0.0, 0.2, 1)) > 1.0
+    assert float(sinking_max(RULE, 0.3, 5.0, 0.0, 0.0, 0.2, 1)) > 10.0
+    assert float(sinking_max(RULE, 0.3, 2.0, 0.0, 0.0, 0.1, 1)) > 10.0
+
+
+def test_without_depth_it_stays_over_the_chest_of_who_is_near_as_with_late_pictures() -> None:
+    """How far away they look is a seventh off."""
+    for over_m, far_m in ((0.3, 2.0), (1.0, 2.0), (2.0, 2.0), (0.3, 5.0)):
+        late, by_looks = (float(sinking_max(RULE, over_m, far_m, 0.0, 0.0, *how)) for how in ((0.2, 1), (0.1, 0)))
+        assert late == by_looks
 
 
 def test_what_it_takes_off_is_only_what_brings_it_nearer() -> None:
