@@ -22,7 +22,7 @@ from policies.tasks.follow_me.track import Ranges
 from policies.tasks.follow_me.tracked.keep_off import SLOW_S
 
 PLOT = Path(__file__).parents[1] / "results" / "images" / "failures.png"
-FLIGHTS = (("crossed", 3947055), ("phone", 3947111), ("gone-8-silent", 3947061))
+FLIGHTS = (("crossed", 3951063), ("twins", 3951055), ("gone-3-run-silent", 3951043))
 SHOWN_S = 16.0
 BEFORE_S = 4.0  # of these are from before it left the band
 MARKS_S = 4.0
