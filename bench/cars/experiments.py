@@ -164,14 +164,14 @@ and blocks are others in each episode does it learn to drive around what it sees
 what the document reports: its 92 % are within what five seeds come to. Sharpening made no difference that they could
 show. Where the most probable actions turn to and fro for ever on one of three goals, they do so in each of its
 episodes, since the start is the same. Of the quarters, the one that holds the start is bridged; in the others the car
-hits blocks, or in one of them walls, on roads that it was never sent down. One of the two worst is nearly bridged, too,
-once starts and blocks are others in each episode. Imitation of the planner (400 episodes on those goals) finds the
-three goals, too, beside PPO (but for two seeds of fifteen, one goal each), by cloning alone, or, in three seeds of five,
-by GAIL alone. It does not help on new spots: with GAIL as strong as the task four seeds of five park on fewer than any by PPO
-alone (62.7 % in place of 73.0 %, of five), by cloning alone 56.1 %, with walls hit as well as blocks, and GAIL alone is anything from 4 to 69 %.
-Mirroring every other episode in training does not
-help on new spots: alone it parks on no more than without it, and where starts and blocks are anywhere it changes
-nothing that five seeds could show."""
+hits blocks, or in one of them walls, on roads that it was never sent down. One of the two worst is nearly bridged,
+too, once starts and blocks are others in each episode. Imitation of the planner (400 episodes on those goals) finds
+the three goals, too, beside PPO (but for two seeds of fifteen, one goal each), by cloning alone, or, in three seeds
+of five, by GAIL alone. It does not help on new spots: with GAIL as strong as the task four seeds of five park on
+fewer than any by PPO alone (62.7 % in place of 73.0 %, of five), by cloning alone 56.1 %, with walls hit as well as
+blocks, and GAIL alone is anything from 4 to 69 %. Mirroring every other episode in training does not help on new
+spots: alone it parks on no more than without it, and where starts and blocks are anywhere it changes nothing that
+five seeds could show."""
 
 _DONE_RIGHT_REMARKS = """\
 Where chance does not find the goal, novelty does: the top of Gymnasium's MountainCar, paid there alone, with settings
