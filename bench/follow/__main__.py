@@ -88,13 +88,13 @@ def _take(result: Result, folder: Path) -> None:
     """Takes a result as done, with its policy where that ships; not without, where something still needs the policy."""
     path, stage = result_path(folder, result.stage, result.seed), STAGES[result.stage]
     shipped = PRETRAINED / stage.file_name
-    is_there = stage.ships and result.seed == 1 and shipped.exists()
+    is_there = stage.ships and shipped.exists() and load_policy(shipped)[1].seed == result.seed
     is_needed = any(stage.name in other.before for other in STAGES.values())
     if path.exists() or (not is_there and (is_needed or (stage.flies and not result.cards(is_flown=True)))):
         return
     write(path, result)
     if is_there:
-        write_whole(policy_path(folder, result.stage, 1), shipped.read_bytes())
+        write_whole(policy_path(folder, result.stage, result.seed), shipped.read_bytes())
 
 
 def published(results_folder: Path, pretrained: Path, choose: Choose = best_of) -> list[str]:

@@ -24,6 +24,7 @@ from bench.follow.leaderboard_rows import (
 from common.files import write_whole
 from mission.benchmark.session import markdown
 from mission.follow.benchmark.conditions import BY_NAME
+from policies.learn.export.provenance import short_commit
 from policies.tasks.follow_me.scorecard import written
 
 PAGE = DOCS / "leaderboard.md"
@@ -39,7 +40,7 @@ def with_entries(text: str, entries: Sequence[Entry]) -> str:
 
 def _tables(order: Sequence[Entry]) -> str:
     ranks = [_rank(place, entry, order[0]) for place, entry in enumerate(order, 1)]
-    who = [(e.name, f"`{e.policy}`", e.sees, e.made, e.commit[:8] or "not kept") for e in order]
+    who = [(e.name, f"`{e.policy}`", e.sees, e.made, short_commit(e.commit)) for e in order]
     return "\n".join(
         [
             markdown(("", "policy", "in band, mean", "behind the first", "no collision", *TITLES), ranks),

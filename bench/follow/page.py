@@ -11,6 +11,7 @@ from bench.follow.result import Judged, Result
 from bench.follow.stages import CELLS, OWNER_SPEEDS, STAGES, Stage, in_order
 from common.files import write_whole
 from common.intervals import Interval
+from policies.learn.export.provenance import short_commit
 from policies.tasks.follow_me.scorecard import NAMES, written
 from policies.tasks.follow_me.track import Ranges
 
@@ -153,7 +154,7 @@ def _training(results: Results, docs: Path) -> str:
         lines.append(
             f"| {stage.title} | {first.steps / 1e6:.2f} M | {first.cores} | {duration(seconds)} | {duration(whole)} "
             f"| {limit} | {first.steps_per_s:,.0f} | {len(runs)} | {first.policy_bytes / 1024:,.0f} kB "
-            f"| {first.commit[:8] or 'not kept'} |"
+            f"| {short_commit(first.commit)} |"
         )
     for reward, name in REWARDS.items():
         drawn = {stage.title: results.get(stage.name, ()) for stage in STAGES.values() if stage.reward == reward}

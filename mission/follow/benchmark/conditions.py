@@ -14,7 +14,7 @@ LEAST_KEPT, LEAST_STOOD, LEAST_RESUMED = 0.95, 0.95, 0.9
 time after the last sight, and that followed again in time."""
 
 
-AIRFRAME = "x500"  # that policies were trained on
+AIRFRAME = "x500"  # of a condition that names none
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,12 @@ def commit_of(root: Path) -> str:
     return f"{commit} {CHANGED}" if is_changed else commit
 
 
+def short_commit(commit: str) -> str:
+    """A commit as a page names it, with whether files differed from it."""
+    number, _, changed = commit.partition(" ")
+    return f"{number[:8]} {changed}".rstrip() or "not kept"
+
+
 def _git(root: Path, *words: str) -> str | None:
     """What git says; None: it says nothing, or is not there."""
     command = ["git", "-C", str(root), *words]

@@ -20,8 +20,10 @@ REACTION_S = 0.25  # from a setpoint to the motion, besides the age of the pictu
 ESCAPE_CLIMB_M_S = 2.5  # nearer than allowed, until it is over their head
 OVER_M = wp.constant(1.45)  # so far above their chest it is
 _OVER_GAIN = wp.constant(2.0)  # [1/s]
-_LATE_S = wp.constant(0.15)  # with older pictures than this, or ranges that are told from looks
-_HIGH_M = wp.constant(1.0)  # it stays so far above the chest of who is near, from where it is soon over their head
+_LATE_S = wp.constant(0.15)  # with older pictures than this
+_HIGH_M = wp.constant(
+    1.0
+)  # or without depth it stays so far above the chest of who is near, from where it is soon over their head
 _HIGH_WITHIN_M = wp.constant(4.0)
 _RISE_M_S = wp.constant(0.8)
 _CLIMBS_S = wp.constant(0.35)  # who comes is climbed over by the way that they go in so long at the latest; guess
@@ -177,9 +179,8 @@ def bounds(
     b.then_m = distance_then(way, level, other_vel, k.reaction_s, age_s)
     unit = unit_of(way)
     closing, coming = wp.dot(level - other_vel, unit), -wp.dot(other_vel, unit)
-    b.sinking_max = sinking_max(
-        k, over_m - lost_m, b.then_m, closing, coming, age_s, has_depth
-    )  # but to climb no farther
+    high_m = over_m - lost_m  # but to climb no farther
+    b.sinking_max = sinking_max(k, high_m, b.then_m, closing, coming, age_s, has_depth)
     return b
 
 
