@@ -68,8 +68,7 @@ def best_first(found: Mapping[Path, Interval]) -> list[Path]:
 
 def best_of(paths: Sequence[Path], stage: Stage) -> tuple[Path, Interval]:
     """The policy of a stage whose interval of its figure begins highest, and that interval."""
-    numbers = load_policy(paths[0])[1].samplers() if stage.is_chosen_as_drawn else {}
-    found = {path: getattr(judged(path, WIDE, EPISODES, numbers), stage.figure) for path in paths}
+    found = {path: getattr(judged(path, WIDE, EPISODES, {}), stage.figure) for path in paths}
     best = best_first(found)[0]
     return best, found[best]
 

@@ -35,7 +35,6 @@ class Stage:
     flies: bool = False  # also judged in flights over MAVLink
     ships: bool = True  # with --publish the best seed's policy goes to policies/pretrained/
     ships_as: str = ""  # under this name; the recipe's, if none
-    is_chosen_as_drawn: bool = False  # the best seed is chosen in the conditions of training, not in the preset's
     document: str = "not reported"
     limit_s: float | None = None  # wall clock at most, with all stages before it
     figure: str = "in_band"  # of the scorecard, that the targets are of
@@ -82,8 +81,7 @@ STAGES: dict[str, Stage] = {
             teacher="teacher",
             start="student",
             flies=True,
-            is_chosen_as_drawn=True,
-            limit_s=3600.0,
+            ships=False,
         ),
         Stage(
             "vision-only",

@@ -13,14 +13,16 @@ from mission.cli import app
 from policies.companion.pilot import load_pilot
 from policies.datasets.reader import DatasetReader
 from tests.system.companion.test_recorded_flight import flown
+from tests.unit.policies.companion.test_pilot import policy_file
 
 CAMERA = ("--env-args", "observation=camera")
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("camera") / "run"
-    return folder, flown(folder, "follow-me-late")
+    parent = tmp_path_factory.mktemp("camera")
+    folder = parent / "run"
+    return folder, flown(folder, str(policy_file(parent)))
 
 
 def built(source, out, *words):

@@ -2,6 +2,7 @@
 
 import inspect
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from bench.follow.run import policy_path, result_path
 from bench.follow.stages import CELLS, OWNER_SPEEDS, STAGES, in_order
 from common.intervals import Interval
 from policies.learn.config.recipes import recipe
-from policies.learn.export.policy_file import load_policy
+from policies.learn.export.policy_file import load_policy, save_policy
 from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.follow_me.scorecard import scorecard
 from policies.tasks.follow_me.track import Track
@@ -89,7 +90,7 @@ def test_policies_that_ship_stay_unless_new_ones_are_published(tmp_path):
     results, ships = tmp_path / "results", tmp_path / "pretrained"
     results.mkdir()
     ships.mkdir()
-    old, new, same = (shipped(name) for name in ("follow-me-late", "follow-me-tracked", "follow-me-teacher"))
+    old, new, same = (shipped(name) for name in ("navigate", "follow-me-tracked", "follow-me-teacher"))
     (ships / "follow-me-tracked.pt").write_bytes(old)
     (ships / "follow-me-teacher.pt").write_bytes(same)
     made = {"tracked-wide": new, "teacher": same, "tuned": old}
@@ -109,21 +110,22 @@ def test_nothing_is_published_of_fewer_than_three_seeds(tmp_path):
     ships = tmp_path / "pretrained"
     ships.mkdir()
     for seed in (1, 2):
-        (tmp_path / f"late-{seed}.pt").write_bytes(shipped("follow-me-late"))
-    (ships / "follow-me-late.pt").write_bytes(shipped("follow-me-tracked"))
-    assert published(tmp_path, ships, second) == ["follow-me-late.pt: stays: of late 2 of the 3 seeds are trained"]
-    assert (ships / "follow-me-late.pt").read_bytes() == shipped("follow-me-tracked")
+        (tmp_path / f"teacher-{seed}.pt").write_bytes(shipped("follow-me-teacher"))
+    (ships / "follow-me-teacher.pt").write_bytes(shipped("navigate"))
+    (line,) = published(tmp_path, ships, second)
+    assert line == "follow-me-teacher.pt: stays: of teacher 2 of the 3 seeds are trained"
+    assert (ships / "follow-me-teacher.pt").read_bytes() == shipped("navigate")
     assert inspect.signature(main).parameters["seeds"].default == 3
 
 
 def test_of_the_seeds_the_chosen_is_published_whichever_shipped_and_says_what_it_was_chosen_by(tmp_path):
     ships = tmp_path / "pretrained"
     ships.mkdir()
-    (tmp_path / "late-1.pt").write_bytes(shipped("follow-me-late"))
-    (tmp_path / "late-2.pt").write_bytes(shipped("follow-me-tracked"))
-    (tmp_path / "late-3.pt").write_bytes(shipped("follow-me-late"))
-    (tmp_path / "tracked-student-1.pt").write_bytes(shipped("follow-me-teacher"))  # of a stage that does not ship
-    (ships / "follow-me-late.pt").write_bytes(shipped("follow-me-late"))
+    (tmp_path / "tracked-wide-1.pt").write_bytes(shipped("navigate"))
+    (tmp_path / "tracked-wide-2.pt").write_bytes(shipped("follow-me-tracked"))
+    (tmp_path / "tracked-wide-3.pt").write_bytes(shipped("navigate"))
+    (tmp_path / "late-1.pt").write_bytes(shipped("follow-me-teacher"))  # of a stage that does not ship
+    (ships / "follow-me-tracked.pt").write_bytes(shipped("navigate"))
     asked = []
 
     def choose(paths, stage):
@@ -131,8 +133,8 @@ def test_of_the_seeds_the_chosen_is_published_whichever_shipped_and_says_what_it
         return second(paths, stage)
 
     assert len(published(tmp_path, ships, choose)) == 1
-    assert asked == [(["late-1.pt", "late-2.pt", "late-3.pt"], "in_band")]
-    _, card = load_policy(ships / "follow-me-late.pt")
+    assert asked == [(["tracked-wide-1.pt", "tracked-wide-2.pt", "tracked-wide-3.pt"], "in_band")]
+    _, card = load_policy(ships / "follow-me-tracked.pt")
     assert (card.figures["band_low"], card.figures["band_high"]) == (0.7, 0.9)
     assert not unpublished(tmp_path, ships)  # the card differs, the policy does not
 
@@ -150,7 +152,12 @@ def test_the_best_is_whose_interval_begins_highest_and_of_equals_the_first():
 
 def test_what_the_shipped_page_was_made_of_leaves_every_other_stage_able_to_begin(tmp_path, monkeypatch):
     """With its results taken as done, a stage whose policy does not ship any more is trained where others need it."""
+    ships = tmp_path / "ships"
+    ships.mkdir()
+    policy, card = load_policy(pretrained("follow-me-teacher"))
+    save_policy(ships / "follow-me-teacher.pt", policy, replace(card, seed=1))  # of a seed that is recorded
     monkeypatch.setattr("bench.follow.__main__.RESULTS", tmp_path)
+    monkeypatch.setattr("bench.follow.__main__.PRETRAINED", ships)
     for each in read_all(RUNS):
         _take(each, tmp_path)
     left = _jobs(list(STAGES), 1)

@@ -45,7 +45,7 @@ def test_the_page_is_what_the_rows_give():
 
 
 def test_the_shipped_policies_and_the_script_have_entries():
-    assert {"follow-me-tracked", "follow-me-late", "scripted"} <= {row.policy for row in read_rows()}
+    assert {"follow-me-tracked", "scripted"} <= {row.policy for row in read_rows()}
 
 
 def test_conditions_are_of_the_benchmark():

@@ -39,7 +39,7 @@ count = len(loaded)
 if has_owner:
     from mission.follow.lockstep import flight_with_companion
     from policies.companion.pilot import load_pilot
-    flight, _ = flight_with_companion(config, load_pilot("follow-me-late"))
+    flight, _ = flight_with_companion(config, load_pilot("follow-me-tracked"))
 else:
     flight = Flight(config)
 async def hop(drone):

@@ -24,6 +24,7 @@ from policies.datasets.reader import DatasetReader
 from policies.tasks.follow_me.follow_me_params import FOLLOW_PARAMS
 from policies.tasks.follow_me.observe import EGO, TRACKED
 from tests.unit.mission.follow.goto_flight import advance
+from tests.unit.policies.companion.test_pilot import policy_file
 
 
 class FullSpeedAhead:
@@ -278,8 +279,9 @@ def test_an_exported_policy_of_something_else_is_refused_in_a_sentence(tmp_path,
 
 def test_an_exported_policy_chooses_what_the_policy_itself_does(tmp_path):
     """By onnxruntime, with its memory, over some seconds of images that differ."""
-    exported = exported_to(tmp_path / "policy.onnx", "follow-me-late")
-    own, theirs = any_pilot("follow-me-late"), any_pilot(exported)
+    policy = str(policy_file(tmp_path))
+    exported = exported_to(tmp_path / "policy.onnx", policy)
+    own, theirs = any_pilot(policy), any_pilot(exported)
     rng = np.random.default_rng(1)
     for _ in range(20):
         vector = rng.normal(0.0, 0.5, 21).astype(np.float32)

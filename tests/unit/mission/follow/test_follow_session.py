@@ -75,8 +75,8 @@ def test_a_film_shows_every_second_frame(tmp_path):
         (("--guard-setting", "owner_m=-1"), "--guard-setting owner_m: must be above 0, not -1.0"),
         (("--speed", "-1"), "--speed -1: must be a number above 0"),
         (
-            ("--airframe", "rover", "--policy", "follow-me-late"),
-            "follow-me-late: it was made for another kind of vehicle",
+            ("--airframe", "rover", "--policy", "follow-me-tracked"),
+            "follow-me-tracked: it was made for another kind of vehicle",
         ),
         (("--airframe", "rover", "--policy", "scripted"), "scripted: it was made for another kind of vehicle"),
         (

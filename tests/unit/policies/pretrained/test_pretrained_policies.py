@@ -1,10 +1,14 @@
-"""The policies that ship: each is a small policy file of the task it is called by."""
+"""The policies that ship: each is a small policy file of the task it is called by, and says where it comes from."""
 
+import re
 from importlib.resources import files
 from pathlib import Path
 
+import pytest
+
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy
+from policies.learn.export.provenance import weights_sha256
 from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.catalogue import CATALOGUE, build_task, file_stem, task_settings
 
@@ -30,3 +34,28 @@ def test_policy_is_found_by_its_task_and_by_its_own_name(tmp_path, monkeypatch):
 
 def test_task_without_a_policy_has_none():
     assert pretrained("Flight") is None
+
+
+def legs(path):
+    """What cards say of each training behind a policy that ships, teachers' too."""
+    card = load_policy(path)[1]
+    found = card.as_parent()
+    return [*found, *(leg["teacher"]["card"] for leg in found if leg["teacher"])]
+
+
+def test_the_teacher_that_a_shipped_student_names_ships():
+    teachers = [leg["teacher"] for path in SHIPPED for leg in load_policy(path)[1].as_parent() if leg["teacher"]]
+    assert teachers
+    for teacher in teachers:
+        assert teacher["weights_sha256"] == weights_sha256(load_policy(find_policy(teacher["policy"]))[0])
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_a_shipped_policy_says_seed_and_commit_of_all_its_legs_and_what_it_was_chosen_by(path):
+    for leg in legs(path):
+        assert leg["seed"] >= 1
+        assert re.fullmatch("[0-9a-f]{40}", leg["code"]["commit"]), leg["code"]
+    figures = load_policy(path)[1].figures
+    measure = "band" if "band_rate" in figures else "success"
+    assert figures[f"{measure}_low"] < figures[f"{measure}_rate"] < figures[f"{measure}_high"]
+    assert figures["episodes"] >= 100

@@ -1,8 +1,8 @@
 """What a card says of where a policy comes from: the commit of its code, its teacher, its datasets."""
 
 import subprocess
+from dataclasses import asdict
 
-import pytest
 from rich.console import Console
 
 from bench.judged_card import write_judged
@@ -51,7 +51,7 @@ def test_a_teacher_is_known_by_the_hash_of_its_weights_and_its_card():
     record = teacher_record(behavior)
     assert record["policy"] == "follow-me-teacher"
     assert record["weights_sha256"] == weights_sha256(load_policy(find_policy("follow-me-teacher"))[0])
-    assert (record["card"]["task"], record["card"]["seed"]) == ("FollowMe", 1)
+    assert record["card"] == asdict(load_policy(find_policy("follow-me-teacher"))[1])
     assert teacher_record(Behavior()) == {}
 
 
@@ -63,13 +63,6 @@ def test_the_hash_of_weights_stays_where_the_card_changes_and_changes_with_a_wei
     assert weights_sha256(policy) == weights_sha256(load_policy(source)[0])
     next(policy.parameters()).data.view(-1)[0] += 1.0
     assert weights_sha256(policy) != weights_sha256(load_policy(source)[0])
-
-
-@pytest.mark.parametrize("student", ["follow-me-late", "follow-me-tracked"])
-def test_the_teacher_that_a_shipped_student_names_ships(student):
-    card = load_policy(find_policy(student))[1]
-    teacher = card.teacher or next(leg["teacher"] for leg in card.parents if leg["teacher"])
-    assert teacher["weights_sha256"] == weights_sha256(load_policy(find_policy(teacher["policy"]))[0])
 
 
 def test_datasets_are_known_by_what_they_are_for_and_of_whom(tmp_path):

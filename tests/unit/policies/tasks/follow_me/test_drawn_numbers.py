@@ -1,4 +1,4 @@
-"""How often episodes of the followers that ship are without depth, among others, or with a phone that is silent."""
+"""How often episodes of the hardened followers are without depth, among others, or with a phone that is silent."""
 
 import numpy as np
 import pytest
