@@ -211,8 +211,8 @@ SECTIONS: tuple[Section, ...] = (
     ),
     Section(
         "Learning to Drive: five variants",
-        "The document's settings, 2 million steps each: 16 areas, PPO in ML-Agents' form. A4 has the sparse reward. Rows\n"
-        "of 3 x 512 units are of one seed, where five are wanted: they say what can come of it, not how often.",
+        "The document's settings, 2 million steps each: 16 areas, PPO in ML-Agents' form. A4 has the sparse reward.\n"
+        "Rows of 3 x 512 units are of one seed, where five are wanted: they say what can come of it, not how often.",
         REACH_CURVES,
         (
             Image(
