@@ -8,7 +8,7 @@ from policies.learn.export.policy_file import POLICY
 
 
 def write_judged(source: Path, target: Path, measure: str, found: Interval, episodes: int) -> None:
-    """Writes a policy with a figure of episodes that it did not train on in its card.
+    """Writes a policy with a figure of episodes that it did not train on in its card, in place of others of episodes.
 
     Args:
         source: the policy file.
@@ -19,5 +19,6 @@ def write_judged(source: Path, target: Path, measure: str, found: Interval, epis
     """
     content = load(source, POLICY)
     figures = {f"{measure}_rate": found.value, f"{measure}_low": found.low, f"{measure}_high": found.high}
-    content["card"]["figures"] |= figures | {"episodes": episodes}
+    of_training = {name: value for name, value in content["card"]["figures"].items() if name.startswith("training_")}
+    content["card"]["figures"] = of_training | figures | {"episodes": episodes}
     save(target, content, POLICY)

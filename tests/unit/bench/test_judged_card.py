@@ -25,3 +25,4 @@ def test_the_time_in_the_band_is_told_likewise(tmp_path):
     write_judged(pretrained("drive-reach"), tmp_path / "chosen.pt", "band", Interval(0.7, 0.65, 0.75), 256)
     rows = dict(card_rows(load_policy(tmp_path / "chosen.pt")[1]))
     assert rows["time in the band, judged"].startswith("70.00 % (95 %: 65.00 to 75.00) of 256 ")
+    assert "success, judged" not in rows  # which was of other episodes

@@ -55,7 +55,7 @@ def test_a_shipped_policy_says_seed_and_commit_of_all_its_legs_and_what_it_was_c
     for leg in legs(path):
         assert leg["seed"] >= 1
         assert re.fullmatch("[0-9a-f]{40}", leg["code"]["commit"]), leg["code"]
-    figures = load_policy(path)[1].figures
-    measure = "band" if "band_rate" in figures else "success"
+    card = load_policy(path)[1]
+    figures, measure = card.figures, "band" if card.task == "FollowMe" else "success"
     assert figures[f"{measure}_low"] < figures[f"{measure}_rate"] < figures[f"{measure}_high"]
     assert figures["episodes"] >= 100
