@@ -35,6 +35,8 @@ they have learned, its critic alone seeing the truth. Each stage is one process 
 times with another beside it; glibc keeps their memory and OpenMP's threads wait passively (`bench/side_by_side.py`).
 Wall clock is that of training; compiling the kernels, once per machine, is not in it. Judged are most probable actions
 in held-out worlds: fresh hills, trees, owners, wind and noise, {episodes}.
+In batch the trackers, and they alone, meet what they are trained in: late and lost pictures, missing depth, rough
+sensors, others about, under the guard's rule of people; in flight they meet what all do.
 "Flown" are flights over MAVLink in lockstep: the whole autopilot, a companion computer, one vehicle at a time,
 without a guard. Seeds of flights are odd, those of training even; where the commit is "not kept" half of the flights
 had even seeds, of which there are so many that hardly one was trained on. How the policies that ship do under the
@@ -51,9 +53,9 @@ as not followed. A loss is {loss:g} s or more out of view or beyond {lost:g} m.
 
 
 NOT_RUN = """\
-"Not run" is what this command has not trained here. What ships of it was trained by these recipes as they were then,
-three seeds, each stage by itself: [how, and how long that
-took](../../policies/pretrained/README.md#how-long-and-how-far-apart).
+"Not run" is what this command has not trained here: [what an earlier form of it came
+to](harder.md#policies-that-look-at-images). What ships is the best of three seeds of these recipes, each stage by
+itself: [how, and how long that took](../../policies/pretrained/README.md#how-long-and-how-far-apart).
 """
 
 
