@@ -1,12 +1,13 @@
 """`python -m bench.follow [STAGE…]`: trains the stages of docs/results/follow.md from scratch and writes the page.
 
 Stages that are done (results/follow/STAGE-SEED.json) are kept and stopped ones go on; `--again` trains them anew,
-`--page` only writes the page, `--shipped` takes what the shipped page was made of (docs/results/follow.jsonl) as done.
+`--page` only writes the page, `--shipped` takes what the shipped page was made of (docs/results/follow.jsonl) as done,
+but where another stage needs a policy of a seed that does not ship.
 What is not trained here stays on the page as it is recorded there, with the commit that trained it.
 Policies stay in results/follow/; `--publish` puts them in the place of those that ship: of at least three seeds of a
-stage the one that is best in worlds of validation (`bench.follow.choice`). Whether it is better than what ships is
-not asked: look at the page first. Two processes go side by side, each on a core of its own; a stage waits for those it
-needs, and one that takes several cores for all others to end.
+stage the one that is best in worlds of validation (`bench.follow.choice`), with the teacher that it had. Whether it is
+better than what ships is not asked: look at the page first. Two processes go side by side, each on a core of its own; a
+stage waits for those it needs, and one that takes several cores for all others to end.
 """
 
 import shutil
@@ -20,7 +21,7 @@ import typer
 from rich.console import Console
 
 from bench.cars.page import DOCS
-from bench.follow.choice import EPISODES, MEASURES, best_of
+from bench.follow.choice import EPISODES, best_of
 from bench.follow.page import write_page
 from bench.follow.result import Result, read, read_all, write, write_all
 from bench.follow.run import policy_path, result_path
@@ -36,7 +37,7 @@ RUNS = DOCS / "follow.jsonl"
 PRETRAINED = Path(__file__).parents[2] / "policies" / "pretrained"
 SEEDS = 3  # the fewest that what ships is chosen among
 console = Console(highlight=False)
-Choose = Callable[[Sequence[Path], Stage], tuple[Path, Interval]]
+Choose = Callable[[Sequence[Path]], tuple[Path, Interval]]
 
 
 def main(
@@ -100,23 +101,34 @@ def _take(result: Result, folder: Path) -> None:
 def published(results_folder: Path, pretrained: Path, choose: Choose = best_of) -> list[str]:
     """Puts policies among those that ship, under the names of their recipes; says which, and where seeds are missing.
 
+    A teacher that ships is not chosen: it is that of the seed that ships of those whom it taught.
+
     Args:
         results_folder: where they were trained.
         pretrained: where those that ship are.
-        choose: the best of the seeds' of a stage.
+        choose: the best of the seeds' of a stage, or of the one that there is.
     """
     lines = []
+    comes_along = {before.name for stage in STAGES.values() if stage.ships for before in in_order([*stage.before])}
     for stage, trained in _trained(results_folder):
-        ships = pretrained / stage.file_name
-        if len(trained) < SEEDS:
-            lines.append(f"{ships.name}: stays: of {stage.name} {len(trained)} of the {SEEDS} seeds are trained")
+        if stage.name in comes_along:
             continue
-        before = ships.read_bytes() if ships.exists() else b""
-        best, found = choose(trained, stage)
-        write_judged(best, ships, MEASURES[stage.figure], found, EPISODES)
-        if ships.read_bytes() != before:
-            lines.append(f"{ships.name}: ships now what lies in {best}")
+        if len(trained) < SEEDS:
+            lines.append(f"{stage.file_name}: stays: of {stage.name} {len(trained)} of the {SEEDS} seeds are trained")
+            continue
+        best, found = choose(trained)
+        lines += _put(best, found, pretrained / stage.file_name)
+        for earlier in in_order([*stage.before]):
+            path = policy_path(results_folder, earlier.name, load_policy(best)[1].seed)
+            if earlier.ships and path.exists():
+                lines += _put(*choose([path]), pretrained / earlier.file_name)
     return lines
+
+
+def _put(policy: Path, found: Interval, ships: Path) -> list[str]:
+    before = ships.read_bytes() if ships.exists() else b""
+    write_judged(policy, ships, "band", found, EPISODES)
+    return [f"{ships.name}: ships now what lies in {policy}"] if ships.read_bytes() != before else []
 
 
 def unpublished(results_folder: Path, pretrained: Path) -> list[str]:

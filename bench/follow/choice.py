@@ -16,7 +16,6 @@ from rich.progress import track
 from rich.table import Table
 
 from bench.follow.judge import first_episodes
-from bench.follow.stages import Stage
 from bench.judged_card import write_judged
 from common.intervals import Interval
 from policies.learn.export.policy_file import load_policy
@@ -24,11 +23,9 @@ from policies.tasks.catalogue import task_settings
 from policies.tasks.follow_me.follow_me import FollowMe
 from policies.tasks.follow_me.scorecard import Scorecard, scorecard, written
 from policies.tasks.follow_me.settings import FollowSettings
-from policies.tasks.task_params import Sampler
 
 WIDE = "x500+f450+f550"
 EPISODES = 1000  # of each policy: two minutes
-MEASURES = {"in_band": "band", "success": "success"}  # figures of the scorecard as cards call them
 
 
 def main(
@@ -36,28 +33,26 @@ def main(
     airframe: Annotated[str, typer.Option(help="Of several with + between them one is drawn per episode.")] = WIDE,
     episodes: Annotated[int, typer.Option(min=2, help="Of each policy.")] = EPISODES,
     out: Annotated[Path | None, typer.Option(help="The best goes there.")] = None,
-    drawn_as: Annotated[Path | None, typer.Option(help="Conditions: as this policy's training drew them.")] = None,
 ) -> None:
-    numbers = load_policy(drawn_as)[1].samplers() if drawn_as is not None else {}
-    found = {path: judged(path, airframe, episodes, numbers) for path in track(policies, "judging", transient=True)}
+    found = {path: judged(path, airframe, episodes) for path in track(policies, "judging", transient=True)}
     table = Table("policy", "in band", "collided")
     ordered = best_first({path: card.in_band for path, card in found.items()})
     for path in ordered:
         table.add_row(str(path), written(found[path].in_band, "%"), written(found[path].collision, "%"))
     Console().print(table)
     if out is not None:
-        write_judged(ordered[0], out, MEASURES["in_band"], found[ordered[0]].in_band, episodes)
+        write_judged(ordered[0], out, "band", found[ordered[0]].in_band, episodes)
 
 
-def judged(path: Path, airframe: str, episodes: int, numbers: Mapping[str, Sampler]) -> Scorecard:
-    """A policy in worlds of validation, on the flight controller's estimate; other numbers are the preset's."""
+def judged(path: Path, airframe: str, episodes: int) -> Scorecard:
+    """A policy in worlds of validation, on the flight controller's estimate; numbers are the preset's."""
     policy, card = load_policy(path)
     changed = {"split": "validation", "airframe": airframe, "has_estimator": "true", "terrain": "fresh"}
     settings = task_settings("FollowMe", {key: str(value) for key, value in card.settings.items()} | changed)
     assert isinstance(settings, FollowSettings)
     task = FollowMe(settings, episodes)
     task.layout.require(policy.layout, str(path))
-    tracks, _ = first_episodes(policy, task, numbers)
+    tracks, _ = first_episodes(policy, task, {})
     return scorecard(tracks)
 
 
@@ -66,9 +61,9 @@ def best_first(found: Mapping[Path, Interval]) -> list[Path]:
     return sorted(found, key=lambda path: -found[path].low)
 
 
-def best_of(paths: Sequence[Path], stage: Stage) -> tuple[Path, Interval]:
-    """The policy of a stage whose interval of its figure begins highest, and that interval."""
-    found = {path: getattr(judged(path, WIDE, EPISODES, {}), stage.figure) for path in paths}
+def best_of(paths: Sequence[Path]) -> tuple[Path, Interval]:
+    """The policy whose interval of the time in the band begins highest, and that interval."""
+    found = {path: judged(path, WIDE, EPISODES).in_band for path in paths}
     best = best_first(found)[0]
     return best, found[best]
 

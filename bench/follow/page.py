@@ -27,7 +27,7 @@ make reproduce-follow
 ```
 
 What comes of it stays in `results/follow/`, and the policies that ship are kept: with `ARGS="--publish"` the best
-of three seeds of each stage take their place; one seed, in a third of the time, is `ARGS="--seeds 1"`.
+of three seeds of each that ships take their place; one seed, in a third of the time, is `ARGS="--seeds 1"`.
 
 A teacher that sees the truth is trained by PPO; students that see what flies (a 64 x 64 picture with depth, the flight
 controller's estimate and, but for vision-only, the phone's reports) learn from it by DAgger; PPO may go on with what
@@ -53,9 +53,9 @@ as not followed. A loss is {loss:g} s or more out of view or beyond {lost:g} m.
 
 
 NOT_RUN = """\
-"Not run" is what this command has not trained here: [what an earlier form of it came
-to](harder.md#policies-that-look-at-images). What ships is the best of three seeds of these recipes, each stage by
-itself: [how, and how long that took](../../policies/pretrained/README.md#how-long-and-how-far-apart).
+"Not run" is what this command has not trained here; what "Hardened" came to by an earlier form of its recipe is [told
+elsewhere](harder.md#policies-that-look-at-images). What ships was trained stage by stage, three seeds of each: [how,
+and how long that took](../../policies/pretrained/README.md#how-long-and-how-far-apart).
 """
 
 

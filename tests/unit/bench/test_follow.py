@@ -19,6 +19,7 @@ from bench.follow.stages import CELLS, OWNER_SPEEDS, STAGES, in_order
 from common.intervals import Interval
 from policies.learn.config.recipes import recipe
 from policies.learn.export.policy_file import load_policy, save_policy
+from policies.learn.export.provenance import weights_sha256
 from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.follow_me.scorecard import scorecard
 from policies.tasks.follow_me.track import Track
@@ -82,8 +83,8 @@ def shipped(name):
     return pretrained(name).read_bytes()
 
 
-def second(paths, stage):
-    return paths[1], Interval(0.8, 0.7, 0.9)
+def second(paths):
+    return paths[-1 if len(paths) < 3 else 1], Interval(0.8, 0.7, 0.9)
 
 
 def test_policies_that_ship_stay_unless_new_ones_are_published(tmp_path):
@@ -110,11 +111,13 @@ def test_nothing_is_published_of_fewer_than_three_seeds(tmp_path):
     ships = tmp_path / "pretrained"
     ships.mkdir()
     for seed in (1, 2):
+        (tmp_path / f"tracked-wide-{seed}.pt").write_bytes(shipped("follow-me-tracked"))
         (tmp_path / f"teacher-{seed}.pt").write_bytes(shipped("follow-me-teacher"))
-    (ships / "follow-me-teacher.pt").write_bytes(shipped("navigate"))
+    (ships / "follow-me-tracked.pt").write_bytes(shipped("navigate"))
     (line,) = published(tmp_path, ships, second)
-    assert line == "follow-me-teacher.pt: stays: of teacher 2 of the 3 seeds are trained"
-    assert (ships / "follow-me-teacher.pt").read_bytes() == shipped("navigate")
+    assert line == "follow-me-tracked.pt: stays: of tracked-wide 2 of the 3 seeds are trained"
+    assert [path.name for path in ships.iterdir()] == ["follow-me-tracked.pt"]
+    assert (ships / "follow-me-tracked.pt").read_bytes() == shipped("navigate")
     assert inspect.signature(main).parameters["seeds"].default == 3
 
 
@@ -128,15 +131,29 @@ def test_of_the_seeds_the_chosen_is_published_whichever_shipped_and_says_what_it
     (ships / "follow-me-tracked.pt").write_bytes(shipped("navigate"))
     asked = []
 
-    def choose(paths, stage):
-        asked.append(([path.name for path in paths], stage.figure))
-        return second(paths, stage)
+    def choose(paths):
+        asked.append([path.name for path in paths])
+        return second(paths)
 
     assert len(published(tmp_path, ships, choose)) == 1
-    assert asked == [(["tracked-wide-1.pt", "tracked-wide-2.pt", "tracked-wide-3.pt"], "in_band")]
+    assert asked == [["tracked-wide-1.pt", "tracked-wide-2.pt", "tracked-wide-3.pt"]]
     _, card = load_policy(ships / "follow-me-tracked.pt")
     assert (card.figures["band_low"], card.figures["band_high"]) == (0.7, 0.9)
     assert not unpublished(tmp_path, ships)  # the card differs, the policy does not
+
+
+def test_the_teacher_that_ships_is_that_of_the_seed_that_ships(tmp_path):
+    ships = tmp_path / "pretrained"
+    ships.mkdir()
+    for seed, teacher in ((1, "navigate"), (2, "follow-me-teacher"), (3, "navigate")):
+        (tmp_path / f"tracked-wide-{seed}.pt").write_bytes(shipped("follow-me-tracked"))  # whose seed is 2
+        (tmp_path / f"teacher-{seed}.pt").write_bytes(shipped(teacher))
+    assert load_policy(pretrained("follow-me-tracked"))[1].seed == 2
+    assert len(published(tmp_path, ships, second)) == 2
+    hashes = (
+        weights_sha256(load_policy(path)[0]) for path in (ships / "follow-me-teacher.pt", tmp_path / "teacher-2.pt")
+    )
+    assert len({*hashes}) == 1
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(90.0, "90 s"), (900.0, "15.0 min"), (7200.0, "2.0 h")])
