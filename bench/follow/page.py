@@ -15,7 +15,11 @@ from policies.learn.export.provenance import short_commit
 from policies.tasks.follow_me.scorecard import NAMES, written
 from policies.tasks.follow_me.track import Ranges
 
-REWARDS = {"ours": "follow-reward", "the document's": "follow-document-reward"}  # what is drawn, and where
+REWARDS = {  # what is drawn, and where
+    "ours": "follow-reward",
+    "the trackers'": "follow-tracked-reward",
+    "the document's": "follow-document-reward",
+}
 Results = Mapping[str, Sequence[Result]]
 INTRODUCTION = """# Following an owner, trained anew
 
@@ -57,6 +61,12 @@ NOT_RUN = """\
 elsewhere](harder.md#policies-that-look-at-images). What ships was trained stage by stage, three seeds of each: [how,
 and how long that took](../../policies/pretrained/README.md#how-long-and-how-far-apart).
 """
+
+
+REMARKS = """\
+A teacher drives students' first rounds. The trackers' reward falls where a lesson raises what jerks and turns cost.
+Rows whose commits differ were trained on different machines, which differ by up to a factor of two; sums over what came
+before mix them."""
 
 
 def write_page(results: Results, docs: Path = DOCS) -> Path:
@@ -164,7 +174,7 @@ def _training(results: Results, docs: Path) -> str:
             title = f"Mean episode reward while training, {reward}"
             curves.draw(docs / "images" / f"{name}.png", title, drawn, value="reward", over="wall_s")
             lines += ["", f"![{title}](images/{name}.png)"]
-    lines += ["", "A teacher drives students' first rounds."]
+    lines += ["", REMARKS]
     return "\n".join(lines) + "\n"
 
 

@@ -30,7 +30,7 @@ class Stage:
     start: str | None = None  # stage whose networks this one starts from
     changes: dict[str, Any] = field(default_factory=dict)  # of the recipe: path with dots to value
     judged: dict[str, Any] = field(default_factory=dict)  # settings of the task to judge in, over the recipe's
-    reward: str = "ours"  # or the document's: they cannot be compared
+    reward: str = "ours"  # or the trackers', whose costs grow by lessons, or the document's: they cannot be compared
     takes_all: bool = False  # its training is given all cores
     flies: bool = False  # also judged in flights over MAVLink
     ships: bool = True  # with --publish the best seed's policy goes to policies/pretrained/
@@ -99,6 +99,7 @@ STAGES: dict[str, Stage] = {
             "Tracked, first: what detector, filter and map say, no image, DAgger",
             "follow-me-tracked-student",
             teacher="teacher",
+            reward="the trackers'",
             ships=False,
         ),
         Stage(
@@ -106,13 +107,15 @@ STAGES: dict[str, Stage] = {
             "Tracked, then: that student goes on by PPO",
             "follow-me-tracked",
             start="tracked-student",
+            reward="the trackers'",
             ships=False,
         ),
         Stage(
             "tracked-wide",
-            "Tracked: goes on by PPO with the flight controller's estimate, rough sensors, three airframes",
+            "Tracked: goes on by PPO on the estimate, with rough sensors, in three airframes",
             "follow-me-tracked-wide",
             start="tracked",
+            reward="the trackers'",
             flies=True,
             ships_as="follow-me-tracked",
             limit_s=3600.0,
