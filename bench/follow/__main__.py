@@ -109,10 +109,7 @@ def published(results_folder: Path, pretrained: Path, choose: Choose = best_of) 
         choose: the best of the seeds' of a stage, or of the one that there is.
     """
     lines = []
-    comes_along = {before.name for stage in STAGES.values() if stage.ships for before in in_order([*stage.before])}
     for stage, trained in _trained(results_folder):
-        if stage.name in comes_along:
-            continue
         if len(trained) < SEEDS:
             lines.append(f"{stage.file_name}: stays: of {stage.name} {len(trained)} of the {SEEDS} seeds are trained")
             continue
@@ -143,8 +140,10 @@ def unpublished(results_folder: Path, pretrained: Path) -> list[str]:
 
 
 def _trained(results_folder: Path) -> list[tuple[Stage, list[Path]]]:
-    """The policies of all seeds of each stage that ships and has been trained."""
-    stages = [stage for stage in STAGES.values() if stage.ships]
+    """The policies of all seeds of each stage that has been trained and ships by choice: not along with a later one."""
+    shipping = [stage for stage in STAGES.values() if stage.ships]
+    earlier = {before.name for stage in shipping for before in in_order([*stage.before])}
+    stages = [stage for stage in shipping if stage.name not in earlier]
     found = [(stage, sorted(results_folder.glob(f"{stage.name}-[0-9]*.pt"))) for stage in stages]
     return [(stage, trained) for stage, trained in found if trained]
 

@@ -82,6 +82,7 @@ STAGES: dict[str, Stage] = {
             start="student",
             flies=True,
             ships=False,
+            limit_s=3600.0,
         ),
         Stage(
             "vision-only",

@@ -20,10 +20,8 @@ REACTION_S = 0.25  # from a setpoint to the motion, besides the age of the pictu
 ESCAPE_CLIMB_M_S = 2.5  # nearer than allowed, until it is over their head
 OVER_M = wp.constant(1.45)  # so far above their chest it is
 _OVER_GAIN = wp.constant(2.0)  # [1/s]
-_LATE_S = wp.constant(0.15)  # with older pictures than this
-_HIGH_M = wp.constant(
-    1.0
-)  # or without depth it stays so far above the chest of who is near, from where it is soon over their head
+_LATE_S = wp.constant(0.15)  # with older pictures than this, or without depth, ...
+_HIGH_M = wp.constant(1.0)  # ... it stays so far above the chest of who is near, from where it is soon over their head
 _HIGH_WITHIN_M = wp.constant(4.0)
 _RISE_M_S = wp.constant(0.8)
 _CLIMBS_S = wp.constant(0.35)  # who comes is climbed over by the way that they go in so long at the latest; guess
