@@ -8,6 +8,7 @@ from math import asin, atan2, cos, pi, sin, sqrt
 
 Vector = tuple[float, float, float]
 Quat = tuple[float, float, float, float]  # x, y, z, w
+_STEEP = 1e-6  # squared length; steeper, where ahead is is not known, and rounding may make it negative
 
 
 def product(a: Sequence[float], b: Sequence[float]) -> Quat:
@@ -63,7 +64,7 @@ def levelled(v_frd: Sequence[float], down_frd: Sequence[float]) -> Vector:
     x, y, z = v_frd
     lean_x, lean_y = down_frd
     upright = sqrt(max(1.0 - lean_x * lean_x - lean_y * lean_y, 0.0))
-    level = sqrt(1.0 - lean_x * lean_x)  # length of the body's x axis without what points down
+    level = sqrt(max(1.0 - lean_x * lean_x, _STEEP))  # length of the body's x axis without what points down
     down = lean_x * x + lean_y * y + upright * z
     return (x - lean_x * down) / level, (upright * y - lean_y * z) / level, down
 
