@@ -283,11 +283,13 @@ class Behavior(Block):
 
     @model_validator(mode="after")
     def _only_cloned(self) -> Self:
-        network = self.network_settings
+        network, kind = self.network_settings, self.trainer_type
+        if network.mixture > 1 and kind != "bc":
+            raise ValueError(f"network_settings: mixture: is for trainer_type bc, not for {kind}")
         has_transformer = network.memory is not None and network.memory.memory_type == "transformer"
-        for is_asked, what in ((network.mixture > 1, "mixture"), (has_transformer, "memory.memory_type transformer")):
-            if is_asked and self.trainer_type != "bc":
-                raise ValueError(f"network_settings: {what}: is for trainer_type bc, not for {self.trainer_type}")
+        if has_transformer and kind not in ("bc", "dagger"):
+            what = "memory.memory_type transformer"
+            raise ValueError(f"network_settings: {what}: is for trainer_type bc or dagger, not for {kind}")
         return self
 
     @model_validator(mode="after")

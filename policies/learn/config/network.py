@@ -18,7 +18,7 @@ class Memory(Block):
     """Floats of state: half of them hidden, half of them cell."""
 
     memory_type: Literal["lstm", "transformer"] = own_key("lstm")
-    """What remembers; `transformer`, for `trainer_type: bc`, remembers its inputs, and `memory_size` does not count."""
+    """What remembers; `transformer`, for `bc` and `dagger`, remembers its inputs, and `memory_size` does not count."""
     layers: Count = own_key(2)
     """Of a transformer."""
     heads: Count = own_key(4)

@@ -251,7 +251,7 @@ def test_ppo_goes_on_and_its_policy_waits_for_the_critic(tmp_path, roller_ball):
         ),
         (
             {"trainer_type": "ppo", "offline": None, "network_settings": TRANSFORMER},
-            "network_settings: memory.memory_type transformer: is for trainer_type bc, not for ppo",
+            "network_settings: memory.memory_type transformer: is for trainer_type bc or dagger, not for ppo",
         ),
         (
             {"trainer_type": "bc", "network_settings": {**TRANSFORMER, "hidden_units": 15}},

@@ -36,7 +36,6 @@ def learner(task, *, teacher=None, network=(), seed=1, **hyperparameters):
 def mean_reward(task, policy, episodes=256):
     """Of the most probable actions, per decision."""
     student = learner(task)
-    student.policy.load_state_dict(policy.state_dict())
     memory = policy.start_memory(task.env_count)
     rewards = []
     with torch.inference_mode():
@@ -48,10 +47,16 @@ def mean_reward(task, policy, episodes=256):
     return sum(rewards) / len(rewards)
 
 
-@pytest.fixture(scope="module")
-def trained():
+MEMORIES = {
+    "lstm": NETWORK["memory"],
+    "transformer": {"memory_type": "transformer", "sequence_length": 8, "layers": 1, "heads": 2},
+}
+
+
+@pytest.fixture(scope="module", params=MEMORIES)
+def trained(request):
     """A student that has learnt."""
-    student = learner(Glimpses(32), perception_strength=0.5)
+    student = learner(Glimpses(32), network={"memory": MEMORIES[request.param]}, perception_strength=0.5)
     while student.steps < 14_000:
         student.iterate()
     return student
@@ -87,7 +92,7 @@ def test_what_the_teacher_drives_costs_nothing():
     assert scores.return_sum / scores.episode_count == pytest.approx(0.0, abs=1e-5)
 
 
-@pytest.mark.parametrize("memory", [{"memory_size": 32, "sequence_length": 8}, None], ids=["lstm", "feed-forward"])
+@pytest.mark.parametrize("memory", [*MEMORIES.values(), None], ids=[*MEMORIES, "feed-forward"])
 def test_a_restored_learner_goes_on_bit_for_bit(memory):
     network = {"memory": memory}
     one = learner(Glimpses(16), network=network, save_replay_buffer=True)
