@@ -123,6 +123,14 @@ STAGES: dict[str, Stage] = {
             targets=(0.98, 0.95),
         ),
         Stage(
+            "tracked-away",
+            "Tracked: goes on with owners who stay away, in five airframes, two of them identified",
+            "follow-me-tracked-away",
+            start="tracked-wide",
+            reward="the trackers'",
+            ships=False,
+        ),
+        Stage(
             "document",
             "As documented: pixels and seven numbers, plain PPO",
             "follow-me-document",
