@@ -92,7 +92,7 @@ def test_an_owner_who_crouches_does_so_before_the_camera_and_not_on_their_phone(
 
 
 def test_in_batch_a_condition_is_of_all_that_sets_it_apart_or_is_not_judged():
-    assert not {"f450", "f550", "no-gnss"} & {*_IN_BATCH}
+    assert not {"f450", "f550", "x500-fitted", "f550-fitted", "no-gnss"} & {*_IN_BATCH}
     usual = numbers_of(BY_NAME["walk"])
     for name in {*_IN_BATCH} - {"walk"}:
         assert numbers_of(BY_NAME[name]) != usual, name
