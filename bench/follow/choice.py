@@ -18,11 +18,15 @@ from rich.table import Table
 from bench.follow.judge import first_episodes
 from bench.judged_card import write_judged
 from common.intervals import Interval
+from policies.learn.config.load import load_config
+from policies.learn.config.recipes import recipe as recipe_file
+from policies.learn.curriculum import Curriculum
 from policies.learn.export.policy_file import load_policy
 from policies.tasks.catalogue import task_settings
 from policies.tasks.follow_me.follow_me import FollowMe
 from policies.tasks.follow_me.scorecard import Scorecard, scorecard, written
 from policies.tasks.follow_me.settings import FollowSettings
+from policies.tasks.task_params import Sampler
 
 WIDE = "x500+f450+f550"
 EPISODES = 1000  # of each policy: two minutes
@@ -32,9 +36,13 @@ def main(
     policies: list[Path],
     airframe: Annotated[str, typer.Option(help="Of several with + between them one is drawn per episode.")] = WIDE,
     episodes: Annotated[int, typer.Option(min=2, help="Of each policy.")] = EPISODES,
+    recipe: Annotated[
+        str | None, typer.Option(help="Episodes as this recipe ends with; default: the preset's.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="The best goes there.")] = None,
 ) -> None:
-    found = {path: judged(path, airframe, episodes) for path in track(policies, "judging", transient=True)}
+    numbers = {} if recipe is None else numbers_of(recipe)
+    found = {path: judged(path, airframe, episodes, numbers) for path in track(policies, "judging", transient=True)}
     table = Table("policy", "in band", "collided")
     ordered = best_first({path: card.in_band for path, card in found.items()})
     for path in ordered:
@@ -44,15 +52,20 @@ def main(
         write_judged(ordered[0], out, "band", found[ordered[0]].in_band, episodes)
 
 
-def judged(path: Path, airframe: str, episodes: int) -> Scorecard:
-    """A policy in worlds of validation, on the flight controller's estimate; numbers are the preset's."""
+def numbers_of(recipe: str) -> dict[str, Sampler]:
+    """What a recipe's episodes are drawn from in its last lesson."""
+    return Curriculum(load_config(recipe_file(recipe)).config.environment_parameters).final_params()
+
+
+def judged(path: Path, airframe: str, episodes: int, numbers: Mapping[str, Sampler] | None = None) -> Scorecard:
+    """A policy in worlds of validation, on the flight controller's estimate; other numbers are the preset's."""
     policy, card = load_policy(path)
     changed = {"split": "validation", "airframe": airframe, "has_estimator": "true", "terrain": "fresh"}
     settings = task_settings("FollowMe", {key: str(value) for key, value in card.settings.items()} | changed)
     assert isinstance(settings, FollowSettings)
     task = FollowMe(settings, episodes)
     task.layout.require(policy.layout, str(path))
-    tracks, _ = first_episodes(policy, task, {})
+    tracks, _ = first_episodes(policy, task, numbers or {})
     return scorecard(tracks)
 
 
