@@ -36,9 +36,7 @@ def main(
     policies: list[Path],
     airframe: Annotated[str, typer.Option(help="Of several with + between them one is drawn per episode.")] = WIDE,
     episodes: Annotated[int, typer.Option(min=2, help="Of each policy.")] = EPISODES,
-    recipe: Annotated[
-        str | None, typer.Option(help="Episodes as this recipe ends with; default: the preset's.")
-    ] = None,
+    recipe: Annotated[str | None, typer.Option(help="Episodes as it ends with; default: the preset's.")] = None,
     out: Annotated[Path | None, typer.Option(help="The best goes there.")] = None,
 ) -> None:
     numbers = {} if recipe is None else numbers_of(recipe)
