@@ -1,4 +1,4 @@
-"""A policy file whose card says how good it was found to be in worlds of validation, and is else as it was."""
+"""A policy file whose card says how good it was found to be in worlds of validation, and what its teacher ships as."""
 
 from pathlib import Path
 
@@ -22,3 +22,13 @@ def write_judged(source: Path, target: Path, measure: str, found: Interval, epis
     of_training = {name: value for name, value in content["card"]["figures"].items() if name.startswith("training_")}
     content["card"]["figures"] = of_training | figures | {"episodes": episodes}
     save(target, content, POLICY)
+
+
+def name_teacher(policy: Path, trained: Path, name: str) -> None:
+    """Writes, of a teacher that the card knows by where it was trained, the name that it ships under."""
+    content = load(policy, POLICY)
+    card = content["card"]
+    for leg in (*card["parents"], card):
+        if leg["teacher"].get("policy") == str(trained):
+            leg["teacher"]["policy"] = name
+    save(policy, content, POLICY)

@@ -26,7 +26,7 @@ from bench.follow.page import write_page
 from bench.follow.result import Result, read, read_all, write, write_all
 from bench.follow.run import policy_path, result_path
 from bench.follow.stages import STAGES, Stage, in_order
-from bench.judged_card import write_judged
+from bench.judged_card import name_teacher, write_judged
 from bench.side_by_side import Job, run_side_by_side
 from common.files import write_whole
 from common.intervals import Interval
@@ -119,6 +119,7 @@ def published(results_folder: Path, pretrained: Path, choose: Choose = best_of) 
             path = policy_path(results_folder, earlier.name, load_policy(best)[1].seed)
             if earlier.ships and path.exists():
                 lines += _put(*choose([path]), pretrained / earlier.file_name)
+                name_teacher(pretrained / stage.file_name, path, earlier.recipe)
     return lines
 
 

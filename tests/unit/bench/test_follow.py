@@ -17,8 +17,9 @@ from bench.follow.result import Judged, Result, read, read_all, write, write_all
 from bench.follow.run import policy_path, result_path
 from bench.follow.stages import CELLS, OWNER_SPEEDS, STAGES, in_order
 from common.intervals import Interval
+from policies.learn.checkpoint import load, save
 from policies.learn.config.recipes import recipe
-from policies.learn.export.policy_file import load_policy, save_policy
+from policies.learn.export.policy_file import POLICY, load_policy, save_policy
 from policies.learn.export.provenance import weights_sha256
 from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.follow_me.scorecard import scorecard
@@ -154,6 +155,21 @@ def test_the_teacher_that_ships_is_that_of_the_seed_that_ships(tmp_path):
         weights_sha256(load_policy(path)[0]) for path in (ships / "follow-me-teacher.pt", tmp_path / "teacher-2.pt")
     )
     assert len({*hashes}) == 1
+
+
+def test_the_teacher_that_ships_is_named_as_it_ships_and_not_by_where_it_was_trained(tmp_path):
+    ships = tmp_path / "pretrained"
+    ships.mkdir()
+    teacher = tmp_path / "teacher-2.pt"
+    teacher.write_bytes(shipped("follow-me-teacher"))
+    content = load(pretrained("follow-me-tracked"), POLICY)
+    content["card"]["parents"][0]["teacher"]["policy"] = str(teacher)
+    for seed in (1, 2, 3):
+        save(tmp_path / f"tracked-wide-{seed}.pt", content, POLICY)
+    published(tmp_path, ships, second)
+    first, *others = load_policy(ships / "follow-me-tracked.pt")[1].parents
+    assert first["teacher"]["policy"] == "follow-me-teacher"
+    assert [leg["teacher"] for leg in others] == [{}] * len(others)
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(90.0, "90 s"), (900.0, "15.0 min"), (7200.0, "2.0 h")])
