@@ -25,6 +25,7 @@ from policies.tasks.follow_me.tracked.keep_off import OWNER_BRAKE_M_S2, REACTION
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
 SEED = 3_930_001  # odd, as of all tests
+AIRFRAMES = "x500", "f450", "f550", "x500-fitted", "f550-fitted"
 LEG, STAND = 40, 25  # decisions at the speed, and at none
 _TURNS = 4  # how often it stops
 _STANDS_M_S = 0.15  # beside what wind and noise do
@@ -88,7 +89,7 @@ def rule_m(speed: float) -> float:
 def main() -> None:
     """Prints the table."""
     table = Table("airframe", "wind [m/s]", "speed [m/s]", "to a stand [m]", "and a decision more", "the rule")
-    cases = list(product(("x500", "f450", "f550"), (0.0, 8.0), (2.0, 4.0, 6.0)))
+    cases = list(product(AIRFRAMES, (0.0, 8.0), (2.0, 4.0, 6.0)))
     for airframe, wind_m_s, speed in track(cases, "braking", transient=True):
         way_m = float(stopping_m(airframe, speed, wind_m_s).max())
         more_m = way_m + speed * float(DECISION_S)
