@@ -124,7 +124,7 @@ STAGES: dict[str, Stage] = {
         ),
         Stage(
             "tracked-away",
-            "Tracked: goes on with owners who stay away, in five airframes, two of them identified",
+            "Tracked: goes on with owners who stay away, in five airframes",
             "follow-me-tracked-away",
             start="tracked-wide",
             reward="the trackers'",
