@@ -11,7 +11,7 @@ stage waits for those it needs, and one that takes several cores for all others 
 """
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -26,7 +26,7 @@ from bench.follow.page import write_page
 from bench.follow.result import Result, read, read_all, write, write_all
 from bench.follow.run import policy_path, result_path
 from bench.follow.stages import STAGES, Stage, in_order
-from bench.judged_card import name_teacher, write_judged
+from bench.judged_card import write_judged
 from bench.side_by_side import Job, run_side_by_side
 from common.files import write_whole
 from common.intervals import Interval
@@ -114,18 +114,22 @@ def published(results_folder: Path, pretrained: Path, choose: Choose = best_of) 
             lines.append(f"{stage.file_name}: stays: of {stage.name} {len(trained)} of the {SEEDS} seeds are trained")
             continue
         best, found = choose(trained)
-        lines += _put(best, found, pretrained / stage.file_name)
-        for earlier in in_order([*stage.before]):
-            path = policy_path(results_folder, earlier.name, load_policy(best)[1].seed)
-            if earlier.ships and path.exists():
-                lines += _put(*choose([path]), pretrained / earlier.file_name)
-                name_teacher(pretrained / stage.file_name, path, earlier.recipe)
+        seed = load_policy(best)[1].seed
+        along = {
+            path: earlier.file_name
+            for earlier in in_order([*stage.before])
+            if earlier.ships and (path := policy_path(results_folder, earlier.name, seed)).exists()
+        }
+        teachers = {str(path): Path(name).stem for path, name in along.items()}
+        lines += _put(best, found, pretrained / stage.file_name, teachers)
+        for path, name in along.items():
+            lines += _put(*choose([path]), pretrained / name)
     return lines
 
 
-def _put(policy: Path, found: Interval, ships: Path) -> list[str]:
+def _put(policy: Path, found: Interval, ships: Path, teachers: Mapping[str, str] | None = None) -> list[str]:
     before = ships.read_bytes() if ships.exists() else b""
-    write_judged(policy, ships, "band", found, EPISODES)
+    write_judged(policy, ships, "band", found, EPISODES, teachers)
     return [f"{ships.name}: ships now what lies in {policy}"] if ships.read_bytes() != before else []
 
 

@@ -20,6 +20,7 @@ from bench.judged_card import write_judged
 from common.intervals import Interval
 from policies.learn.config.load import load_config
 from policies.learn.config.recipes import recipe as recipe_file
+from policies.learn.config.recipes import recipe_names
 from policies.learn.curriculum import Curriculum
 from policies.learn.export.policy_file import load_policy
 from policies.tasks.catalogue import task_settings
@@ -36,9 +37,11 @@ def main(
     policies: list[Path],
     airframe: Annotated[str, typer.Option(help="Of several with + between them one is drawn per episode.")] = WIDE,
     episodes: Annotated[int, typer.Option(min=2, help="Of each policy.")] = EPISODES,
-    recipe: Annotated[str | None, typer.Option(help="Episodes as it ends with; default: the preset's.")] = None,
+    recipe: Annotated[str | None, typer.Option(help="Draw episodes as its last lesson; not airframes.")] = None,
     out: Annotated[Path | None, typer.Option(help="The best goes there.")] = None,
 ) -> None:
+    if recipe is not None and out is not None:
+        raise typer.BadParameter("--out: a card's figure is of the preset's episodes, without --recipe")
     numbers = {} if recipe is None else numbers_of(recipe)
     found = {path: judged(path, airframe, episodes, numbers) for path in track(policies, "judging", transient=True)}
     table = Table("policy", "in band", "collided")
@@ -51,7 +54,13 @@ def main(
 
 
 def numbers_of(recipe: str) -> dict[str, Sampler]:
-    """What a recipe's episodes are drawn from in its last lesson."""
+    """What a recipe's episodes are drawn from in its last lesson.
+
+    Raises:
+        BadParameter: there is no such recipe.
+    """
+    if recipe not in recipe_names():
+        raise typer.BadParameter(f"--recipe {recipe}: none of {', '.join(recipe_names())}")
     return Curriculum(load_config(recipe_file(recipe)).config.environment_parameters).final_params()
 
 

@@ -1,8 +1,9 @@
 """`python -m bench.follow.memory [--seeds N]`: what a policy's own memory adds to that of filter and map.
 
-Students of the same teacher, trained alike but for what they remember, judged in worlds of validation with an x500 on
-the flight controller's estimate. In: nothing but the teacher that ships. Out: a table of the time in the band and of
-collisions, each the mean over seeds with Student's 95 % interval; the policies stay in results/memory/.
+Students of the same teacher, trained alike but for what they remember; who drives is drawn for each decision, of those
+with a network's memory for each stretch of 16. Judged in worlds of validation with an x500 on the flight controller's
+estimate. In: the teacher that ships. Out: a table of the time in the band and of collisions, of one seed with the
+interval over episodes, of several the mean over seeds with Student's; the policies stay in results/memory/.
 """
 
 from pathlib import Path
@@ -20,8 +21,10 @@ from bench.follow.choice import judged
 from common.intervals import Interval
 from policies.learn.config.load import load_config
 from policies.learn.config.recipes import recipe
+from policies.learn.config.run import RunConfig
 from policies.learn.export.policy_file import load_policy, save_policy
 from policies.learn.trainer import train
+from policies.tasks.follow_me.scorecard import written
 
 FOLDER = Path("results/memory")
 RECIPE = "follow-me-tracked-student"
@@ -51,35 +54,37 @@ def main(
     for name in track(names or list(MEMORIES), "memories", console=console, transient=True):
         cards = [judged(trained(name, seed), "x500", episodes) for seed in range(1, seeds + 1)]
         each = ", ".join(f"{100 * card.in_band.value:.1f}" for card in cards)
-        table.add_row(name, _mean([c.in_band for c in cards]), _mean([c.collision for c in cards]), each)
+        table.add_row(name, _over_seeds([c.in_band for c in cards]), _over_seeds([c.collision for c in cards]), each)
     console.print(table)
+
+
+def configured(name: str, seed: int) -> RunConfig:
+    """A student's training: the recipe's, but for what it remembers."""
+    frames, memory = MEMORIES[name]
+    config = load_config(recipe(RECIPE)).config
+    changes = {
+        "behavior.network_settings.memory": memory,
+        "env_settings.env_args": with_settings(config.env_settings.env_args, {"stack": frames}),
+        "env_settings.seed": seed,
+        "checkpoint_settings.run_id": f"{name}-{seed}",
+        "checkpoint_settings.results_dir": str(FOLDER / "runs"),
+        "checkpoint_settings.force": True,
+    }
+    return changed(config, changes)
 
 
 def trained(name: str, seed: int) -> Path:
     """A student with a memory; the one that is there, if there is one."""
     path = FOLDER / f"{name}-{seed}.pt"
     if not path.exists():
-        frames, memory = MEMORIES[name]
-        config = load_config(recipe(RECIPE)).config
-        config = changed(
-            config,
-            {
-                "behavior.network_settings.memory": memory,
-                "env_settings.env_args": with_settings(config.env_settings.env_args, {"stack": frames}),
-                "env_settings.seed": seed,
-                "checkpoint_settings.run_id": path.stem,
-                "checkpoint_settings.results_dir": str(FOLDER / "runs"),
-                "checkpoint_settings.force": True,
-            },
-        )
+        config = configured(name, seed)
         result = train(config, Curve(config.behavior.max_steps))
         save_policy(path, *load_policy(result.policy), is_half=True)
     return path
 
 
-def _mean(of_seeds: list[Interval]) -> str:
-    mean = over_seeds([100 * interval.value for interval in of_seeds])
-    return f"{mean.value:.1f} %" + (f" ({mean.low:.1f} to {mean.high:.1f})" if len(of_seeds) > 1 else "")
+def _over_seeds(found: list[Interval]) -> str:
+    return written(found[0] if len(found) == 1 else over_seeds([each.value for each in found]), "%")
 
 
 if __name__ == "__main__":

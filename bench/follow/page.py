@@ -66,7 +66,7 @@ and how long that took](../../policies/pretrained/README.md#how-long-and-how-far
 REMARKS = """\
 A teacher drives students' first rounds. The trackers' reward falls where a lesson raises what jerks and turns cost.
 Rows whose commits differ were trained on different machines, which differ by up to a factor of two; sums over what came
-before mix them. Those "with owners who stay away" went on, in three seeds, from the one policy that ships."""
+before mix them."""
 
 
 def write_page(results: Results, docs: Path = DOCS) -> Path:

@@ -123,14 +123,6 @@ STAGES: dict[str, Stage] = {
             targets=(0.98, 0.95),
         ),
         Stage(
-            "tracked-away",
-            "Tracked: goes on with owners who stay away, in five airframes",
-            "follow-me-tracked-away",
-            start="tracked-wide",
-            reward="the trackers'",
-            ships=False,
-        ),
-        Stage(
             "document",
             "As documented: pixels and seven numbers, plain PPO",
             "follow-me-document",

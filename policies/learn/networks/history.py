@@ -1,8 +1,8 @@
 """Memory of policies that look back: a causal transformer over the features of the last decisions.
 
 The memory of a row is those features, oldest first, each with 1.0 behind it, or zeros where the episode is younger.
-Acting looks at them and at the new one. Learning passes whole stretches, which begin with an empty memory; no decision
-looks beyond its episode's start, or further back than `context`. What counts is how long ago something was, not when.
+Acting looks at them and at the new one. Learning passes whole stretches, and looks at just as much; no decision looks
+beyond its episode's start, or further back than `context`. What counts is how long ago something was, not when.
 """
 
 import math
@@ -82,17 +82,26 @@ class History(nn.Module):
         return outputs[:, -1], slots[:, 1:].flatten(1)
 
     def forward(self, inputs: Tensor, memory: Tensor, is_start: Tensor) -> Tensor:
-        """Outputs of whole stretches, (steps, sequences, width).
+        """Outputs of whole stretches, (steps, sequences, width), each as `step` has it.
 
         Args:
-            inputs: shape (steps, sequences, width).
-            memory: is not looked at: stretches begin with an empty one.
+            inputs: shape (steps, sequences, width); of several layers at most `context` steps.
+            memory: before the first step, shape (sequences, memory).
             is_start: where an episode starts with that decision, shape (steps, sequences).
         """
-        del memory
+        steps, sequences, width = inputs.shape
         episode = is_start.T.cumsum(dim=1)
-        is_same = episode[:, :, None] == episode[:, None]
-        return self._looked_back(inputs.transpose(0, 1), is_same).transpose(0, 1)
+        if not memory.any():  # then all that a decision looks at lies in its stretch: one pass
+            is_same = episode[:, :, None] == episode[:, None]
+            return self._looked_back(inputs.transpose(0, 1), is_same).transpose(0, 1)
+        before = memory.view(sequences, self.context - 1, width + 1)
+        tokens = torch.cat((before[:, :, :-1], inputs.transpose(0, 1)), dim=1)
+        older = torch.where(before[:, :, -1] > 0.0, 0, -1)  # of the episode that goes on with the stretch, or nothing
+        windows = tokens.unfold(1, self.context, 1).transpose(2, 3).flatten(0, 1)
+        episodes = torch.cat((older, episode), dim=1).unfold(1, self.context, 1).flatten(0, 1)
+        is_same = (episodes == episodes[:, -1:])[:, None].expand(-1, self.context, -1)
+        outputs = self._looked_back(windows, is_same)[:, -1]
+        return outputs.view(sequences, steps, width).transpose(0, 1)
 
     def distances(self, length: int, device: torch.device | str = "cpu") -> tuple[Tensor, Tensor]:
         """How long ago the second was, seen from the first, and where that is within the context; (length, length)."""

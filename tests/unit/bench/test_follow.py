@@ -170,6 +170,7 @@ def test_the_teacher_that_ships_is_named_as_it_ships_and_not_by_where_it_was_tra
     first, *others = load_policy(ships / "follow-me-tracked.pt")[1].parents
     assert first["teacher"]["policy"] == "follow-me-teacher"
     assert [leg["teacher"] for leg in others] == [{}] * len(others)
+    assert published(tmp_path, ships, second) == []
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(90.0, "90 s"), (900.0, "15.0 min"), (7200.0, "2.0 h")])

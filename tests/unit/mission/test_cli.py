@@ -79,7 +79,7 @@ def test_missing_plan_is_refused(fly, tmp_path):
     [
         (
             ("--airframe", "zeppelin"),
-            r"unknown airframe 'zeppelin'; known: c172, easyglider, f450, f550, plane, rover, rover-skid, ugv, x500",
+            r"unknown airframe 'zeppelin'; known: c172, easyglider, f450, f550, f550-fitted, plane, rover, rover-skid",
         ),
         (("--airframe", "/dev/null/x.toml"), r"unknown airframe"),
         (("--speed", "0"), r"--speed 0: must be a number above 0, or 'max'"),

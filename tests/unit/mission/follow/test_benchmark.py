@@ -75,8 +75,9 @@ def test_conditions_can_be_told_apart():
 
 
 def test_a_condition_sets_wind_and_airframe():
-    flights = [flight_of(BY_NAME[name], 2_000_003) for name in ("walk", "wind", "f550")]
-    assert [(each.wind_m_s, each.airframe) for each in flights] == [(2.0, "x500"), (10.0, "x500"), (2.0, "f550")]
+    flights = [flight_of(BY_NAME[name], 2_000_003) for name in ("walk", "wind", "f550", "x500-fitted", "f550-fitted")]
+    assert [each.wind_m_s for each in flights] == [2.0, 10.0, 2.0, 2.0, 2.0]
+    assert [each.airframe for each in flights] == ["x500", "x500", "f550", "x500-fitted", "f550-fitted"]
 
 
 def test_an_owner_who_crouches_does_so_before_the_camera_and_not_on_their_phone():

@@ -77,6 +77,29 @@ def test_looking_back_step_by_step_is_looking_at_the_whole():
         torch.testing.assert_close(outputs, whole[k])
 
 
+@pytest.mark.parametrize("layers", [1, 2])
+def test_a_stretch_that_begins_amid_an_episode_goes_on_from_its_memory(layers):
+    history = History(8, 4, layers, 2, generator())
+    with torch.no_grad():
+        for layer in history.layers:
+            layer.ago.normal_(generator=generator(5))
+            layer.nothing.normal_(generator=generator(6))
+    inputs = torch.randn(12, 3, 8, generator=generator(1))
+    is_start = torch.zeros(12, 3, dtype=torch.bool)
+    is_start[0], is_start[2, 1], is_start[6, 1], is_start[4, 2] = True, True, True, True
+    memory = torch.zeros(3, history.memory_size)
+    memories, stepped = [], []
+    for k in range(12):
+        memory = memory.masked_fill(is_start[k][:, None], 0.0)
+        memories.append(memory)
+        outputs, memory = history.step(inputs[k], memory)
+        stepped.append(outputs)
+    for begin in (0, 4, 8):
+        stretch = slice(begin, begin + 4)
+        outputs = history(inputs[stretch], memories[begin], is_start[stretch])
+        torch.testing.assert_close(outputs, torch.stack(stepped[stretch]))
+
+
 def test_no_decision_looks_ahead_or_beyond_its_episode():
     history = History(8, 4, 2, 2, generator())
     inputs = torch.randn(6, 1, 8, generator=generator(1)).requires_grad_()

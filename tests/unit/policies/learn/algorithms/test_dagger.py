@@ -49,7 +49,7 @@ def mean_reward(task, policy, episodes=256):
 
 MEMORIES = {
     "lstm": NETWORK["memory"],
-    "transformer": {"memory_type": "transformer", "sequence_length": 8, "layers": 1, "heads": 2},
+    "transformer": {"memory_type": "transformer", "sequence_length": 6, "layers": 1, "heads": 2},  # episodes are of 4
 }
 
 
