@@ -50,7 +50,7 @@ class NetworkSettings(Block):
     deterministic: bool = False
     """Whether `--inference` takes the most probable actions instead of drawing them; training draws."""
     memory: Memory | None = None
-    """LSTM; none: feed-forward."""
+    """LSTM or transformer; none: feed-forward."""
     mixture: Count = own_key(1)
     """Gaussians that continuous actions are a mixture of, for `trainer_type: bc`; the likeliest one acts."""
     perceives: tuple[str, ...] = own_key(())

@@ -1,8 +1,8 @@
 """Bodies of actors and critics, and the critic: observations in, features and values out; ML-Agents' shapes.
 
 A body normalises floats (if asked to), puts the features of an image before them, passes dense layers with swish, and
-an LSTM if it has memory. What is seen has the shape (..., observation) without memory and (steps, sequences,
-observation) with it.
+an LSTM or a transformer if it has memory. What is seen has the shape (..., observation) without memory and (steps,
+sequences, observation) with it.
 """
 
 from collections.abc import Sequence
