@@ -8,7 +8,7 @@ rates, above all commands that were logged seldom, would be taken for drag.
 """
 
 from dataclasses import dataclass
-from math import exp
+from math import exp, sqrt
 from typing import Literal
 
 from common.airframe import AirframeError, load_airframe
@@ -80,12 +80,27 @@ def bounds_of(airframe: MultirotorAirframe, number: FittedNumber) -> tuple[float
 
 
 def with_numbers(airframe: MultirotorAirframe, unknowns: dict[FittedNumber, float]) -> MultirotorAirframe:
-    """An airframe with other values of some numbers."""
+    """An airframe with other values of some numbers; with another curve its rotors idle as fast as before."""
     changes: dict[str, dict[str, float]] = {"body": {}, "rotor_model": {}}
     for number, unknown in unknowns.items():
         section = getattr(airframe, number.section)
         for field in number.fields:
             value = getattr(section, field)
             changes[number.section][field] = value * exp(unknown) if number.is_factor else value + unknown
+    rotor = airframe.rotor_model
+    if "command_curve" in changes["rotor_model"]:
+        curve = changes["rotor_model"]["command_curve"]
+        changes["rotor_model"]["idle_command"] = _command_of(_speed_of(rotor.idle_command, rotor.command_curve), curve)
     sections = {name: getattr(airframe, name).model_copy(update=change) for name, change in changes.items()}
     return airframe.model_copy(update=sections)
+
+
+def _speed_of(command: float, curve: float) -> float:
+    """Of a rotor, of its greatest, at a command."""
+    return curve * command + (1.0 - curve) * sqrt(command)
+
+
+def _command_of(speed: float, curve: float) -> float:
+    """The inverse."""
+    straight = 1.0 - curve
+    return (2.0 * speed / (straight + sqrt(straight * straight + 4.0 * curve * speed))) ** 2 if speed else 0.0

@@ -61,6 +61,15 @@ def changed():
     return with_numbers(X500, {BY_NAME[name]: change for name, change in changes.items()})
 
 
+@pytest.mark.parametrize("change", [-1.0, -0.4])
+def test_with_another_curve_rotors_idle_as_fast_as_before(change):
+    rotor, other = X500.rotor_model, with_numbers(X500, {BY_NAME["command_curve"]: change}).rotor_model
+    assert other.command_curve == pytest.approx(1.0 + change)
+    idle = other.idle_command
+    speed = other.command_curve * idle + (1.0 - other.command_curve) * idle**0.5
+    assert speed == pytest.approx(rotor.idle_command)  # whose curve is 1: speed is the command
+
+
 def test_numbers_are_found_again_in_a_wind(changed):
     segments = flown(changed, commanded(60, 1.0), noise=0.01)
     fit = fit_airframe(X500, segments, NUMBERS)
