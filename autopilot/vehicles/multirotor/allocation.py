@@ -1,17 +1,21 @@
 """Control allocation: torque and collective thrust to motor commands, and what could not be achieved, 250 Hz.
 
-Where a rotor would leave its range, yaw gives way first, then collective thrust, roll and pitch last.
+Where a rotor would leave its range, yaw gives way first, then collective thrust, roll and pitch last; but for these the
+collective does not rise above the weight, lest a vehicle that leans hard again and again climbs away (ArduPilot bounds
+it so by its throttle mix, PX4 lets it not rise at all unless MC_AIRMODE is set).
 """
 
 import warp as wp
 
 from autopilot.vehicles.multirotor.control_airframe import ControlAirframe
+from common.geodesy import GRAVITY_M_S2
 from common.kernels import vec8
 
 wp.set_module_options({"enable_backward": False})
 
 _TINY = wp.constant(1.0e-9)
 _BIG = wp.constant(1.0e9)
+_GRAVITY = wp.constant(GRAVITY_M_S2)
 
 
 @wp.struct
@@ -86,8 +90,10 @@ def fitting_fraction(airframe: ControlAirframe, thrusts: vec8, change: vec8, low
 @wp.func
 def desaturate(airframe: ControlAirframe, torque_frd: wp.vec3, collective_n: float, low: float, high: float) -> vec8:
     """Rotor thrusts [N] within [low, high] that give up yaw, then collective thrust, then roll and pitch."""
-    thrusts = tilt_thrusts(airframe, torque_frd, high - low)
-    thrusts = thrusts + airframe.mix_thrust * fitting_collective(airframe, thrusts, collective_n, low, high)
+    tilt = tilt_thrusts(airframe, torque_frd, high - low)
+    fitting_n = fitting_collective(airframe, tilt, collective_n, low, high)
+    level = airframe.mix_thrust * wp.min(fitting_n, wp.max(collective_n, airframe.mass_kg * _GRAVITY))
+    thrusts = level + tilt * fitting_fraction(airframe, level, tilt, low, high)
     turn = airframe.mix_yaw * torque_frd[2]
     thrusts = thrusts + turn * fitting_fraction(airframe, thrusts, turn, low, high)
     for i in range(airframe.rotor_count):

@@ -41,13 +41,27 @@ def test_thrust_gives_way_before_tilt(x500: Airframe, collective_n: float) -> No
 
 
 def test_too_much_tilt_is_scaled_in_its_direction(x500: Airframe) -> None:
-    results, _, _ = mix(x500, [(30.0, -10.0, 1.0)], [15.0], LOW, HIGH)
+    results, _, _ = mix(x500, [(30.0, -10.0, 1.0)], [2.0 * (LOW + HIGH)], LOW, HIGH)
     roll, pitch, yaw = results["torque_frd"][0]
     assert roll / pitch == pytest.approx(-3.0, rel=1e-4)
     assert abs(yaw) < 1e-4
     thrusts = results["thrust_n"][0, :4]
     assert thrusts.max() == pytest.approx(HIGH, abs=1e-4)
     assert thrusts.min() == pytest.approx(LOW, abs=1e-4)
+
+
+@pytest.mark.parametrize(("asked_n", "most_n"), [(2.0, 14.71), (14.0, 14.71), (16.0, 16.0), (30.0, 30.0)])
+@pytest.mark.parametrize("name", ["x500", "f550-fitted"])
+def test_leaning_hard_lifts_no_vehicle(name: str, asked_n: float, most_n: float) -> None:
+    airframe = load_airframe(name)
+    scale = airframe.body.mass_kg / 1.5
+    for torque in ((30.0, 0.0, 0.0), (0.0, 30.0, 0.0), (-30.0, 30.0, 0.0)):
+        results, _, _ = mix(airframe, [torque], [scale * asked_n], LOW, HIGH)
+        assert results["collective_n"][0] <= scale * most_n + 1e-3
+        roll, pitch = results["torque_frd"][0, :2]
+        assert np.hypot(roll, pitch) > 1.0
+        assert roll * torque[0] >= 0.0
+        assert pitch * torque[1] >= 0.0
 
 
 @pytest.mark.parametrize("count", [4, 5, 6, 8])
