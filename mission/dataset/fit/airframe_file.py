@@ -40,10 +40,10 @@ def write_airframe(start: str, fit: Fit, output: Path, origin: str, mass_kg: flo
             value = float(f"{getattr(getattr(fit.airframe, number.section), field):.6g}")
             source = f"fitted to {origin}: ± {deviation}{unit}"
             entries[number.section][field] = {"value": value, "source": source}
-    if "command_curve" in {number.name for number in fit.stds}:
-        idle = float(f"{fit.airframe.rotor_model.idle_command:.6g}")
-        origin_of_idle = f"the speed of {path.stem} at idle, by the fitted curve"
-        entries["rotor_model"]["idle_command"] = {"value": idle, "source": origin_of_idle}
+        for field in number.followed_by:
+            value = float(f"{getattr(getattr(fit.airframe, number.section), field):.6g}")
+            source = f"the speed of {path.stem} at idle, by the fitted curve"
+            entries[number.section][field] = {"value": value, "source": source}
     for number in fit.unknown:
         for field in number.fields:
             entries[number.section][field]["source"] += "; a fit to logs could not tell it"

@@ -106,7 +106,7 @@ CONDITIONS = (
     Condition("f450", "airframe F450, smaller", "walk", {}, 0.95, airframe="f450"),
     Condition("f550", "airframe F550, of six motors", "walk", {}, 0.95, airframe="f550"),
     Condition("x500-fitted", "airframe of a real X500's log", "walk", {}, 0.95, airframe="x500-fitted"),
-    Condition("f550-fitted", "airframe of a real hexarotor's log", "walk", {}, 0.95, airframe="f550-fitted"),
+    Condition("f550-fitted", "airframe of a real hexacopter's log", "walk", {}, 0.95, airframe="f550-fitted"),
 )
 """In the order of the table."""
 BY_NAME = {condition.name: condition for condition in CONDITIONS}

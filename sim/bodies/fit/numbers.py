@@ -29,6 +29,7 @@ class FittedNumber:
     meaning: str
     by_rates: bool = False  # told by rates; else by velocities
     is_factor: bool = True
+    followed_by: tuple[str, ...] = ()  # fields that change with it
 
     @property
     def name(self) -> str:
@@ -37,7 +38,7 @@ class FittedNumber:
 
 NUMBERS = (
     FittedNumber("rotor_model", ("thrust_n_s2",), "thrust"),
-    FittedNumber("rotor_model", ("command_curve",), "command curve", is_factor=False),
+    FittedNumber("rotor_model", ("command_curve",), "command curve", is_factor=False, followed_by=("idle_command",)),
     FittedNumber("rotor_model", ("inflow_n_s2_m",), "thrust lost to inflow"),
     FittedNumber("rotor_model", ("drag_n_s2_m",), "drag of the rotors"),
     FittedNumber("rotor_model", ("spin_up_time_s", "spin_down_time_s"), "motor lag", by_rates=True),
