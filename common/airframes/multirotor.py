@@ -1,5 +1,6 @@
 """The sections of a multirotor's airframe file."""
 
+from math import sqrt
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -74,3 +75,14 @@ class MultirotorAirframe(Airframe):
 
 
 AIRFRAME = MultirotorAirframe
+
+
+def speed_at(command: float, curve: float) -> float:
+    """Rotor speed over the greatest [0..1] at a motor command [0..1]."""
+    return curve * command + (1.0 - curve) * sqrt(command)
+
+
+def command_at(speed: float, curve: float) -> float:
+    """Motor command [0..1] for a rotor speed over the greatest [0..1]: the inverse of `speed_at`."""
+    straight = 1.0 - curve
+    return (2.0 * speed / (straight + sqrt(straight * straight + 4.0 * curve * speed))) ** 2 if speed else 0.0

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from common.airframes.multirotor import MultirotorAirframe
+from common.airframes.multirotor import MultirotorAirframe, speed_at
 from common.kernels import MAX_MOTORS, vec8
 
 wp.set_module_options({"enable_backward": False})
@@ -83,7 +83,7 @@ def control_airframe(airframe: MultirotorAirframe, left_out: Collection[int] = (
     row.command_curve = rotor.command_curve
     row.idle_command = rotor.idle_command
     curve = rotor.command_curve
-    row.idle_speed_fraction = curve * rotor.idle_command + (1.0 - curve) * rotor.idle_command**0.5
+    row.idle_speed_fraction = speed_at(rotor.idle_command, curve)
     row.motor_time_s = 0.5 * (rotor.spin_up_time_s + rotor.spin_down_time_s)
     row.left_out = sum(1 << rotor for rotor in left_out)
     row.full_voltage_v = airframe.battery.cells * airframe.battery.full_cell_v

@@ -8,11 +8,11 @@ rates, above all commands that were logged seldom, would be taken for drag.
 """
 
 from dataclasses import dataclass
-from math import exp, sqrt
+from math import exp
 from typing import Literal
 
 from common.airframe import AirframeError, load_airframe
-from common.airframes.multirotor import MultirotorAirframe
+from common.airframes.multirotor import MultirotorAirframe, command_at, speed_at
 
 Fittable = MultirotorAirframe
 """What can be fitted."""
@@ -91,17 +91,6 @@ def with_numbers(airframe: MultirotorAirframe, unknowns: dict[FittedNumber, floa
     rotor = airframe.rotor_model
     if "command_curve" in changes["rotor_model"]:
         curve = changes["rotor_model"]["command_curve"]
-        changes["rotor_model"]["idle_command"] = _command_of(_speed_of(rotor.idle_command, rotor.command_curve), curve)
+        changes["rotor_model"]["idle_command"] = command_at(speed_at(rotor.idle_command, rotor.command_curve), curve)
     sections = {name: getattr(airframe, name).model_copy(update=change) for name, change in changes.items()}
     return airframe.model_copy(update=sections)
-
-
-def _speed_of(command: float, curve: float) -> float:
-    """Of a rotor, of its greatest, at a command."""
-    return curve * command + (1.0 - curve) * sqrt(command)
-
-
-def _command_of(speed: float, curve: float) -> float:
-    """The inverse."""
-    straight = 1.0 - curve
-    return (2.0 * speed / (straight + sqrt(straight * straight + 4.0 * curve * speed))) ** 2 if speed else 0.0
