@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from common.attitude import Vector, levelled, rotated
-from policies.image_layers import conv_block, load_weights
+from policies.image_layers import as_flown, conv_block, load_weights
 from policies.tasks.follow_me.observe import HFOV_DEG, LENS_FRD, camera_mount, depth_of
 
 CELLS = 16  # of the map, in rows and columns
@@ -90,7 +90,7 @@ class PersonDetector:
 
     def __init__(self, network: DetectorNetwork | None = None, least: float = 0.2) -> None:
         torch.set_num_threads(1)  # one small image: more threads only wait for each other
-        self._network = (network or shipped()).eval()
+        self._network = as_flown(network or shipped())
         self._least = log(least / (1.0 - least))
 
     def find(self, pixels: NDArray[np.uint8], down_frd: tuple[float, float]) -> list[Detection]:

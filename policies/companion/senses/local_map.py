@@ -29,6 +29,7 @@ _OWNER_M = 0.6  # round the owner, who is no part of the map; they pass trees at
 _LEAD_S = 1.0  # nobody runs into what they reach in so long; guess
 _TOP_M = 0.3  # what is farther up than this is over the vehicle
 _NONE = 255  # of the depth channel: no return
+_DEPTH_M = depth_of(np.minimum(np.arange(_NONE + 1.0), _NONE - 1.0))  # of each level of it
 _ALIVE = 0.05  # fraction of pixels with depth below which there is none
 _UNSEEN = -(10**15)
 _OWN_M = 0.75  # so near nothing is seen: what is not known to be solid is taken to be free,
@@ -130,9 +131,8 @@ class LocalMap:
         owner: tuple[Floats, Floats] | None,
         now_us: int,
     ) -> None:
-        byte = depth.astype(np.float64)
-        is_return = byte < _NONE
-        depth_m = depth_of(np.minimum(byte, _NONE - 1.0))
+        is_return = depth < _NONE
+        depth_m = _DEPTH_M[depth]
         rotation = matrix_of(pose.q_ned_from_frd)
         rays_ned = self._rays_frd @ rotation.T  # of depth 1
         points = rays_ned * depth_m[..., None]

@@ -23,6 +23,7 @@ from torch import Tensor, nn
 from common.files import part_path, write_whole
 from policies.learn.export.onnx_graph import Graph
 from policies.learn.export.onnx_history import add_history
+from policies.learn.export.onnx_layers import add_layers
 from policies.learn.networks.action_distributions import CLIP, LOG_SIGMA_LIMITS, ActionHeads
 from policies.learn.networks.history import History
 from policies.learn.networks.hyper_network import HyperDense
@@ -30,7 +31,6 @@ from policies.learn.networks.networks import Body
 from policies.learn.networks.normalizer import LIMIT
 from policies.learn.networks.observations import Observation
 from policies.learn.networks.policy import Policy
-from policies.learn.networks.vision import Residual
 from policies.tasks.layout import Layout
 
 API_VERSION = 3.0  # ML-Agents' number of this set of names
@@ -92,9 +92,8 @@ def _body(graph: Graph, body: Body, layout: Layout) -> str:
     encoded = ""
     if body.encoder is not None:
         height, width, channels = layout.image_shape
-        encoded = _encoder(
-            graph, body.encoder.layers, graph.input(_names(layout)[0], ["batch", channels, height, width])
-        )
+        images = graph.input(_names(layout)[0], ["batch", channels, height, width])
+        encoded = add_layers(graph, body.encoder.layers, images)
     features = graph.input(_names(layout)[-1], ["batch", layout.observation_size])
     if body.normalizer is not None:
         centred = graph.node("Sub", features, graph.weight(body.normalizer.mean.float()))
@@ -117,32 +116,6 @@ def _body(graph: Graph, body: Body, layout: Layout) -> str:
 def _names(layout: Layout) -> tuple[str, ...]:
     """Of the inputs: the image's, if there is one, and the floats'."""
     return ("obs_0",) if layout.image is None else ("obs_0", "obs_1")
-
-
-def _encoder(graph: Graph, layers: nn.Sequential, images: str) -> str:
-    """Layer by layer; raises TypeError for one that encoders do not have."""
-    for layer in layers:
-        match layer:
-            case nn.Conv2d():
-                images = graph.convolution(images, layer)
-            case nn.LeakyReLU():
-                images = graph.node("LeakyRelu", images, alpha=layer.negative_slope)
-            case nn.ReLU():
-                images = graph.node("Relu", images)
-            case nn.SiLU():
-                images = graph.swish(images)
-            case nn.MaxPool2d():
-                sizes = {"kernel_shape": [layer.kernel_size] * 2, "strides": [layer.stride] * 2}
-                images = graph.node("MaxPool", images, **sizes)
-            case Residual():
-                images = graph.node("Add", images, _encoder(graph, layer.layers, images))
-            case nn.Flatten():
-                images = graph.node("Flatten", images, axis=1)
-            case nn.Linear():
-                images = graph.dense(images, layer)
-            case _:
-                raise TypeError(f"no such layer in a graph: {layer}")
-    return images
 
 
 def _hyper(graph: Graph, hyper: HyperDense, features: str, goals: str) -> str:

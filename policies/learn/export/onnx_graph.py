@@ -39,8 +39,15 @@ class Graph:
     def convolution(self, images: str, layer: nn.Conv2d) -> str:
         """A convolution of (batch, channels, height, width)."""
         sizes = {"kernel_shape": layer.kernel_size, "strides": layer.stride, "pads": [*layer.padding] * 2}
-        assert layer.bias is not None  # noqa: S101  (for the type checker)
-        return self.node("Conv", images, self.weight(layer.weight), self.weight(layer.bias), **sizes)
+        weights = [layer.weight] if layer.bias is None else [layer.weight, layer.bias]
+        return self.node("Conv", images, *map(self.weight, weights), **sizes, dilations=layer.dilation)
+
+    def batch_norm(self, images: str, layer: nn.BatchNorm2d) -> str:
+        """As it is in flight: by the means and variances of training."""
+        mean, var = layer.running_mean, layer.running_var
+        assert mean is not None and var is not None  # noqa: S101, PT018  (for the type checker)
+        numbers = map(self.weight, (layer.weight, layer.bias, mean, var))
+        return self.node("BatchNormalization", images, *numbers, epsilon=layer.eps)
 
     def swish(self, inputs: str) -> str:
         return self.node("Mul", inputs, self.node("Sigmoid", inputs))
