@@ -1,10 +1,13 @@
 """`python -m bench.follow.braking`: the way that a vehicle needs to a stand, and what the guard's rule takes it to be.
 
-A pilot that asks for a speed and then for none, back and forth, over MAVLink in open country and wind. The way counts
-from the decision that asks for none. The rule has to allow for a decision more: who stops may do so right after one.
+A pilot that asks for a speed and then for none, back and forth, over MAVLink in open country and wind, the flight
+controller set as it is to follow, or with `--usual` as it is else. The way counts from the decision that asks for none.
+The rule has to allow for a decision more: who stops may do so right after one.
 """
 
+from collections.abc import Mapping
 from itertools import product
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -14,14 +17,15 @@ from rich.progress import track
 from rich.table import Table
 
 from bench.row import require
-from mission.flight_config import FlightConfig, OwnerConfig
+from common.airframe import load_airframe
+from mission.flight_config import FlightConfig, OwnerConfig, flight_parameters
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.lockstep import flight_with_companion, follow_for
+from mission.follow.vehicle_setup import FOLLOWING, knowing_brakes
 from policies.companion.guard.settings import GuardSettings
 from policies.experts.follower import Floats, ScriptedFollower
 from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.follow_me.observe import DECISION_S
-from policies.tasks.follow_me.tracked.keep_off import OWNER_BRAKE_M_S2, REACTION_S
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
 SEED = 3_930_001  # odd, as of all tests
@@ -53,10 +57,20 @@ class Stopper(ScriptedFollower):
         return np.array([ahead, 0.0, down, 0.0], np.float32)
 
 
-def stopping_m(airframe: str, speed: float, wind_m_s: float) -> Floats:
-    """The way [m] to each stand but the first, while it comes to speed: (stands,)."""
+def config_of(airframe: str, wind_m_s: float, parameters: Mapping[str, float]) -> FlightConfig:
     world = FOLLOW_WORLD.model_copy(update={"trees_per_ha": 0.0, "seed": SEED})
-    config = FlightConfig(airframe=airframe, owner=OwnerConfig(pace="walk"), world=world, seed=SEED, wind_m_s=wind_m_s)
+    return FlightConfig(
+        airframe=airframe,
+        owner=OwnerConfig(pace="walk"),
+        world=world,
+        seed=SEED,
+        wind_m_s=wind_m_s,
+        parameters=dict(parameters),
+    )
+
+
+def stopping_m(config: FlightConfig, speed: float) -> Floats:
+    """The way [m] to each stand but the first, while it comes to speed: (stands,)."""
     pilot = Stopper(speed)
     flight, companion = flight_with_companion(config, pilot, guard=GuardSettings(is_on=False))
     truth = flight.rig.rows["truth"][0]
@@ -73,27 +87,34 @@ def stopping_m(airframe: str, speed: float, wind_m_s: float) -> Floats:
     for turn in range(1, _TURNS):
         is_asked = (asked >= turn * (LEG + STAND) + LEG) & (asked < (turn + 1) * (LEG + STAND))
         first = int(np.argmax(is_asked))
-        require(bool(abs(speeds[first] - speed) < 0.1 * speed), f"{airframe}: came to {speeds[first]:.1f} m/s")
+        require(bool(abs(speeds[first] - speed) < 0.1 * speed), f"{config.airframe}: came to {speeds[first]:.1f} m/s")
         is_standing = is_asked & (speeds < _STANDS_M_S)
-        require(bool(is_standing.any()), f"{airframe}: never stood after {speed:g} m/s")
+        require(bool(is_standing.any()), f"{config.airframe}: never stood after {speed:g} m/s")
         stands = int(np.argmax(is_standing))
         ways.append(float(np.hypot(*(place[stands] - place[first]))))
     return np.array(ways, np.float32)
 
 
-def rule_m(speed: float) -> float:
+def rule_m(config: FlightConfig, speed: float) -> float:
     """What the guard takes it to be [m], with a decision more."""
-    return speed * REACTION_S + 0.5 * speed * speed / OWNER_BRAKE_M_S2
+    guard = knowing_brakes(GuardSettings(), flight_parameters(config, load_airframe(config.airframe)))
+    return speed * guard.reaction_s + 0.5 * speed * speed / guard.owner_brake
 
 
-def main() -> None:
+def main(
+    airframes: Annotated[list[str] | None, typer.Argument(help="Default: all that fly in the benchmark.")] = None,
+    usual: Annotated[
+        bool, typer.Option("--usual", help="The flight controller as it is where nobody follows.")
+    ] = False,
+) -> None:
     """Prints the table."""
     table = Table("airframe", "wind [m/s]", "speed [m/s]", "to a stand [m]", "and a decision more", "the rule")
-    cases = list(product(AIRFRAMES, (0.0, 8.0), (2.0, 4.0, 6.0)))
+    cases = list(product(airframes or AIRFRAMES, (0.0, 8.0), (2.0, 4.0, 6.0)))
     for airframe, wind_m_s, speed in track(cases, "braking", transient=True):
-        way_m = float(stopping_m(airframe, speed, wind_m_s).max())
+        config = config_of(airframe, wind_m_s, {} if usual else FOLLOWING)
+        way_m = float(stopping_m(config, speed).max())
         more_m = way_m + speed * float(DECISION_S)
-        figures = (wind_m_s, speed, way_m, more_m, rule_m(speed))
+        figures = (wind_m_s, speed, way_m, more_m, rule_m(config, speed))
         table.add_row(airframe, *(f"{figure:.3g}" for figure in figures))
     Console().print(table)
 

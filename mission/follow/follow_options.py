@@ -2,13 +2,13 @@
 
 from typing import cast
 
+from common.airframe import load_airframe
 from mission.flight_config import FlightConfig, OwnerConfig
 from mission.flight_options import flight_config
 from mission.flight_settings import FollowOptions, Pace
+from mission.follow.vehicle_setup import BY_SIGHT, FOLLOWING
 from policies.tasks.follow_me.world import FOLLOW_WORLD
-
-BY_SIGHT = {"EKF2_EV_CTRL": 4.0}
-"""The parameter by which our flight controller uses the velocity that the companion sees while GNSS is away."""
+from sim.bodies.vehicles import class_of
 
 
 def follow_config(options: FollowOptions, *, has_scanner: bool = False) -> FlightConfig:
@@ -22,7 +22,10 @@ def follow_config(options: FollowOptions, *, has_scanner: bool = False) -> Fligh
     own = {"seed": options.world_seed, "trees_per_ha": options.trees_per_ha, "hill_height_m": options.hill_height_m}
     world = FOLLOW_WORLD.model_copy(update=own)
     owner = OwnerConfig(pace=cast(Pace, options.owner))
-    parameters = BY_SIGHT | config.parameters if options.board == "own" else config.parameters
+    parameters = config.parameters
+    if options.board == "own":
+        drives = class_of(load_airframe(config.airframe)).drives
+        parameters = (BY_SIGHT if has_scanner or drives else FOLLOWING) | parameters
     return config.model_copy(
         update={"world": world, "owner": owner, "is_forest": has_scanner, "parameters": parameters}
     )

@@ -13,6 +13,7 @@ from mission.flight import Flight, FlightConfig
 from mission.flight_base import FlightBase
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.late_link import LateLink
+from mission.follow.vehicle_setup import knowing_brakes
 from mission.script import set_out
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
@@ -61,7 +62,10 @@ def flight_with_companion(
     if isinstance(pilot, NavigationPilot):
         skill = Navigating(pilot, camera=camera, guard=guard)
     else:
-        skill = Following(camera, pilot, guard or GuardSettings())
+        known = guard or GuardSettings()
+        if isinstance(flight, Flight):
+            known = knowing_brakes(known, flight.params)
+        skill = Following(camera, pilot, known)
     lag_s = config.owner.numbers.get("setpoint_lag_s", 0.0) if config.owner is not None else 0.0
     link = LateLink(companion_end, lag_s, lambda: flight.time_us) if lag_s > 0.0 else companion_end
     companion = Companion(link, skill, is_reported=is_reported, wall_s=wall_s)

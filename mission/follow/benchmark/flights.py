@@ -16,9 +16,9 @@ from mission.benchmark.benchmark import changed_per_min
 from mission.benchmark.kept_flight import KeptFlight
 from mission.flight_config import FlightConfig, OwnerConfig
 from mission.follow.benchmark.conditions import Condition
-from mission.follow.follow_options import BY_SIGHT
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.lockstep import flight_with_companion, follow_for
+from mission.follow.vehicle_setup import FOLLOWING
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.skills.following import Pilot
 from policies.tasks.follow_me.track import Ranges, spans
@@ -68,7 +68,7 @@ def flight_of(condition: Condition, seed: int) -> FlightConfig:
         wind_m_s=wind_m_s,
         airframe=condition.airframe,
         sensor_roughness=condition.sensor_roughness,
-        parameters=dict(BY_SIGHT),
+        parameters=dict(FOLLOWING),
     )
 
 

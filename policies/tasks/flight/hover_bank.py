@@ -25,6 +25,7 @@ AIRFRAME = "x500"
 HOVER_COUNT = 64
 LOW_M = (1.5, 2.5)  # heights of hovers
 PLAIN = WorldConfig(size_m=64.0, hill_height_m=0.0, trees_per_ha=0.0)
+Parameters = tuple[tuple[str, float], ...]  # of the flight controller, that differ from their defaults
 _SPREAD_M = 0.5  # of the places they hover at, to the north and to the east
 
 
@@ -38,8 +39,9 @@ def build_rig(
     airframe_name: str = AIRFRAME,
     sensors: Callable[[float], SensorModel] = sensor_model,
     seed: int = 0,
+    parameters: Parameters = (),
 ) -> Rig:
-    """Vehicles with the default flight controller of their class, powered on at home."""
+    """Vehicles with the flight controller of their class, as it ships but for some parameters, powered on at home."""
     airframe = load_airframe(airframe_name)
     vehicle, body = class_of(airframe)
     rig = Rig(
@@ -56,7 +58,10 @@ def build_rig(
         body=body,
         law=vehicle.law,
     )
-    rig.load_parameters(parameter_table(airframe, vehicle=vehicle))
+    table = parameter_table(airframe, vehicle=vehicle)
+    for name, value in parameters:
+        table.set_exactly(name, value)
+    rig.load_parameters(table)
     return rig
 
 
@@ -67,11 +72,12 @@ def hover_bank(
     heights_m: tuple[float, float] = LOW_M,
     split: Split = "train",
     airframes: tuple[str, ...] = (AIRFRAME,),
+    parameters: Parameters = (),
 ) -> Rig:
     """Vehicles that hover above home, between two heights, each with a heading of its own; as many of each airframe."""
     if len(airframes) == 1:
-        return _hovering(has_estimator, device, heights_m, split, airframes[0])
-    parts = [hover_bank(has_estimator, device, heights_m, split, (name,)) for name in airframes]
+        return _hovering(has_estimator, device, heights_m, split, airframes[0], parameters)
+    parts = [hover_bank(has_estimator, device, heights_m, split, (name,), parameters) for name in airframes]
     bank = _on_the_ground(has_estimator, device, HOVER_COUNT * len(parts), airframes[0], seed=0)
     bank.restore([_joined(rows) for rows in zip(*(part.snapshot() for part in parts), strict=True)])
     return bank
@@ -83,7 +89,9 @@ def _joined(parts: tuple[Rows, ...]) -> Rows:
     return np.concatenate(parts, out=joined, casting="unsafe")
 
 
-def _on_the_ground(has_estimator: bool, device: str, count: int, airframe_name: str, seed: int) -> Rig:
+def _on_the_ground(
+    has_estimator: bool, device: str, count: int, airframe_name: str, seed: int, parameters: Parameters = ()
+) -> Rig:
     plain = build_world(PLAIN, device)
     return build_rig(
         plain,
@@ -93,14 +101,20 @@ def _on_the_ground(has_estimator: bool, device: str, count: int, airframe_name: 
         device=device,
         airframe_name=airframe_name,
         seed=seed,
+        parameters=parameters,
     )
 
 
 def _hovering(
-    has_estimator: bool, device: str, heights_m: tuple[float, float], split: Split, airframe_name: str
+    has_estimator: bool,
+    device: str,
+    heights_m: tuple[float, float],
+    split: Split,
+    airframe_name: str,
+    parameters: Parameters,
 ) -> Rig:
     seed = SPLITS.index(split)
-    rig = _on_the_ground(has_estimator, device, HOVER_COUNT, airframe_name, seed)
+    rig = _on_the_ground(has_estimator, device, HOVER_COUNT, airframe_name, seed, parameters)
     rng = np.random.default_rng(seed)
     low, high = heights_m
     middle, spread = np.array([0.0, 0.0, -0.5 * (low + high)]), np.array([_SPREAD_M, _SPREAD_M, 0.5 * (high - low)])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from policies.tasks.flight.episode_start import Start
 from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT, Makes
-from policies.tasks.flight.hover_bank import AIRFRAME, LOW_M, build_rig, hover_bank
+from policies.tasks.flight.hover_bank import AIRFRAME, LOW_M, Parameters, build_rig, hover_bank
 from policies.tasks.layout import Layout
 from policies.tasks.task import SPLITS, Split, Task
 from policies.tasks.task_params import Sampler
@@ -43,6 +43,7 @@ class RigTask(Task):
         airframes: tuple[str, ...] = (AIRFRAME,),
         sensors: Callable[[float], SensorModel] = sensor_model,
         bank: Rig | None = None,
+        parameters: Parameters = (),
     ) -> None:
         super().__init__(layout, env_count, number_defaults=number_defaults, device=device)
         self.rig: Rig = build_rig(
@@ -53,12 +54,13 @@ class RigTask(Task):
             device=device,
             airframe_name=airframes[0],
             sensors=sensors,
+            parameters=parameters,
         )
         self.noise_seeds = self._zeros("noise_seeds", env_count, int)
         self.hovers = self._zeros("hovers", env_count, int)  # of the bank, that the episode started from
         self.is_starting = self._zeros("is_starting", env_count, wp.bool)
         self._split = split
-        bank = bank or hover_bank(has_estimator, device, hover_heights_m, split, airframes)
+        bank = bank or hover_bank(has_estimator, device, hover_heights_m, split, airframes, parameters)
         self._bank_count = bank.vehicle_count
         self._restore = RowRestore(self.rig, bank, self.hovers, self.is_starting, self.noise_seeds)
         levels = [sensors(k / NOISE_LEVELS_PER_UNIT) for k in range(_NOISE_MAX * NOISE_LEVELS_PER_UNIT + 1)]

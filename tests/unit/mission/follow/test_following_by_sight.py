@@ -10,7 +10,7 @@ from autopilot.interface.failure_requests import Failure, Unit
 from autopilot.interface.vehicle_state import Mode
 from autopilot.ports import POSITION_VALID
 from mission.follow.benchmark.pilots import any_pilot
-from mission.follow.follow_options import BY_SIGHT
+from mission.follow.vehicle_setup import BY_SIGHT
 from policies.companion.engagement import Phase
 from policies.companion.names import FOLLOWER
 from policies.companion.odometry.by_sight import BACK_US

@@ -1,0 +1,70 @@
+"""How the flight controller is set to follow, and that the guard reckons with how it brakes then."""
+
+import pytest
+
+from autopilot.params import parameter_table
+from common.airframe import load_airframe
+from mission.flight_config import flight_parameters
+from mission.flight_settings import FollowOptions
+from mission.follow.follow_options import follow_config
+from mission.follow.vehicle_setup import FOLLOWING, knowing_brakes
+from policies.companion.guard.settings import GuardSettings
+from sim.bodies.vehicles import class_of
+from tests.unit.mission.follow.follow_flight import following
+
+USUAL = GuardSettings().owner_brake
+
+
+def brake_of(airframe, guard=None, **parameters):
+    table = parameter_table(load_airframe(airframe), vehicle=class_of(load_airframe(airframe)).vehicle)
+    for name, value in parameters.items():
+        table.set(name, value)
+    return knowing_brakes(guard or GuardSettings(), table).owner_brake
+
+
+def test_a_vehicle_as_it_ships_brakes_as_a_guard_takes_any_vehicle_to():
+    assert brake_of("x500") == USUAL
+
+
+def test_a_quicker_vehicle_is_taken_to_brake_harder_and_a_slower_one_more_gently():
+    assert brake_of("x500", MPC_ACC_HOR=6.0, MPC_JERK_MAX=30.0) == pytest.approx(1.5 * USUAL)
+    assert brake_of("x500", MPC_ACC_HOR=2.0) == pytest.approx(0.5 * USUAL)
+
+
+def test_what_it_takes_long_to_come_to_does_not_count():
+    assert brake_of("x500", MPC_ACC_HOR=6.0) == USUAL  # the jerk is the usual one
+    assert brake_of("x500", MPC_JERK_MAX=5.0) < 0.5 * USUAL
+
+
+def test_more_than_was_measured_is_not_reckoned_with():
+    assert brake_of("x500", MPC_ACC_HOR=15.0, MPC_JERK_MAX=500.0) == pytest.approx(1.5 * USUAL)
+
+
+def test_a_guard_that_was_told_is_not_told_again():
+    assert brake_of("x500", GuardSettings(owner_brake=2.0), MPC_ACC_HOR=6.0, MPC_JERK_MAX=30.0) == 2.0
+
+
+def test_of_a_vehicle_without_these_parameters_nothing_is_known():
+    assert brake_of("rover") == USUAL
+
+
+@pytest.mark.parametrize("board", ["own", "px4"])
+def test_only_our_own_flight_controller_is_set_so(board):
+    config = follow_config(FollowOptions(board=board))
+    assert set(FOLLOWING).isdisjoint(config.parameters) == (board != "own")
+
+
+def test_what_the_user_sets_stays():
+    config = follow_config(FollowOptions(parameters=["MPC_ACC_HOR=3"]))
+    assert flight_parameters(config, load_airframe("x500"))["MPC_ACC_HOR"] == 3.0
+
+
+@pytest.mark.parametrize(("airframe", "has_scanner"), [("rover", True), ("x500", True)])
+def test_who_navigates_flies_and_drives_as_it_was_trained(airframe, has_scanner):
+    config = follow_config(FollowOptions(airframe=airframe), has_scanner=has_scanner)
+    assert "MPC_ACC_HOR" not in config.parameters
+
+
+def test_the_guard_of_a_flight_knows_its_vehicle():
+    _, companion = following(parameters=FOLLOWING)
+    assert companion.skill.guard.settings.owner_brake == pytest.approx(1.5 * USUAL)
