@@ -21,11 +21,12 @@ from common.airframe import load_airframe
 from mission.flight_config import FlightConfig, OwnerConfig, flight_parameters
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.lockstep import flight_with_companion, follow_for
-from mission.follow.vehicle_setup import FOLLOWING, knowing_brakes
+from mission.follow.vehicle_setup import knowing_brakes
 from policies.companion.guard.settings import GuardSettings
 from policies.experts.follower import Floats, ScriptedFollower
 from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.follow_me.observe import DECISION_S
+from policies.tasks.follow_me.tracked.quick_vehicle import QUICK
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
 SEED = 3_930_001  # odd, as of all tests
@@ -111,7 +112,7 @@ def main(
     table = Table("airframe", "wind [m/s]", "speed [m/s]", "to a stand [m]", "and a decision more", "the rule")
     cases = list(product(airframes or AIRFRAMES, (0.0, 8.0), (2.0, 4.0, 6.0)))
     for airframe, wind_m_s, speed in track(cases, "braking", transient=True):
-        config = config_of(airframe, wind_m_s, {} if usual else FOLLOWING)
+        config = config_of(airframe, wind_m_s, {} if usual else QUICK)
         way_m = float(stopping_m(config, speed).max())
         more_m = way_m + speed * float(DECISION_S)
         figures = (wind_m_s, speed, way_m, more_m, rule_m(config, speed))

@@ -6,9 +6,16 @@ from autopilot.params import parameter_table
 from common.airframe import load_airframe
 from mission.flight_config import flight_parameters
 from mission.flight_settings import FollowOptions
+from mission.follow.benchmark.pilots import any_pilot
 from mission.follow.follow_options import follow_config
-from mission.follow.vehicle_setup import FOLLOWING, knowing_brakes
+from mission.follow.vehicle_setup import knowing_brakes, setup_of
 from policies.companion.guard.settings import GuardSettings
+from policies.companion.names import FOLLOWER
+from policies.companion.skills.load_skill import load_follower
+from policies.experts.follower import ScriptedFollower
+from policies.tasks.follow_me.follow_me import FollowMe
+from policies.tasks.follow_me.settings import FollowSettings
+from policies.tasks.follow_me.tracked.quick_vehicle import QUICK
 from sim.bodies.vehicles import class_of
 from tests.unit.mission.follow.follow_flight import following
 
@@ -50,21 +57,28 @@ def test_of_a_vehicle_without_these_parameters_nothing_is_known():
 
 @pytest.mark.parametrize("board", ["own", "px4"])
 def test_only_our_own_flight_controller_is_set_so(board):
-    config = follow_config(FollowOptions(board=board))
-    assert set(FOLLOWING).isdisjoint(config.parameters) == (board != "own")
+    config = follow_config(FollowOptions(board=board), QUICK)
+    assert set(QUICK).isdisjoint(config.parameters) == (board != "own")
 
 
 def test_what_the_user_sets_stays():
-    config = follow_config(FollowOptions(parameters=["MPC_ACC_HOR=3"]))
+    config = follow_config(FollowOptions(parameters=["MPC_ACC_HOR=3"]), QUICK)
     assert flight_parameters(config, load_airframe("x500"))["MPC_ACC_HOR"] == 3.0
 
 
-@pytest.mark.parametrize(("airframe", "has_scanner"), [("rover", True), ("x500", True)])
-def test_who_navigates_flies_and_drives_as_it_was_trained(airframe, has_scanner):
-    config = follow_config(FollowOptions(airframe=airframe), has_scanner=has_scanner)
-    assert "MPC_ACC_HOR" not in config.parameters
+def test_who_goes_by_the_senses_has_a_quick_vehicle_and_nobody_else():
+    """As where they were trained."""
+    assert setup_of(any_pilot(FOLLOWER)).items() >= QUICK.items()
+    assert set(QUICK).isdisjoint(setup_of(ScriptedFollower()))
+    assert set(QUICK).isdisjoint(setup_of(load_follower("navigate-rover-follow")))
+
+
+def test_it_is_trained_with_what_it_flies():
+    for observation, is_quick in (("tracked", True), ("state", False)):
+        rows = FollowMe(FollowSettings(observation=observation), 2).rig.arrays.autopilot.control_params.numpy()
+        assert (rows["accel_max_xy"] == QUICK["MPC_ACC_HOR"]).all() == is_quick
 
 
 def test_the_guard_of_a_flight_knows_its_vehicle():
-    _, companion = following(parameters=FOLLOWING)
+    _, companion = following(parameters=QUICK)
     assert companion.skill.guard.settings.owner_brake == pytest.approx(1.5 * USUAL)
