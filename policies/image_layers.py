@@ -62,7 +62,7 @@ class Flown(nn.Module):
 
     def forward(self, images: Tensor) -> Tensor:
         """Images (n, channels, height, width) in, maps out."""
-        return torch.from_numpy(self._session.run(None, {"images": images.numpy()})[0])
+        return torch.from_numpy(self._session.run(None, {"images": images.contiguous().numpy()})[0])
 
 
 def as_flown(network: Network) -> Network:

@@ -16,7 +16,6 @@ from bench.follow.stages import CELLS, Cell
 from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
 from mission.follow.lockstep import flight_with_companion, follow_for
-from mission.follow.vehicle_setup import setup_of
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.pilot import load_pilot
 from policies.companion.skills.following import Pilot
@@ -52,7 +51,6 @@ def fly(
         is_forest=isinstance(pilot, NavigationPilot),
         seed=seed,
         wind_m_s=_WINDS_M_S[seed % len(_WINDS_M_S)],
-        parameters=setup_of(pilot),
     )
     alone = GuardSettings(is_on=False)  # the page is about policies
     flight, companion = flight_with_companion(config, pilot, guard=alone)

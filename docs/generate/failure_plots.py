@@ -45,8 +45,9 @@ class Seen:
 def fly(name: str, seed: int) -> Seen:
     """One flight of the benchmark, watched."""
     condition = BY_NAME[name]
-    pilot = load_follower(FOLLOWER)
-    flight, companion = flight_with_companion(flight_of(condition, seed, pilot), pilot, guard=GuardSettings())
+    flight, companion = flight_with_companion(
+        flight_of(condition, seed), load_follower(FOLLOWER), guard=GuardSettings()
+    )
     seen = Seen(f"{condition.title},\nseed {seed}", flight.world.trees)
 
     def look(watch: FollowWatch) -> None:

@@ -13,7 +13,6 @@ from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
 from mission.follow.follow_session import score_lines, watch_of
 from mission.follow.lockstep import flight_with_companion
-from mission.follow.vehicle_setup import setup_of
 from mission.script import take_off
 from mission.view.chase_camera import IMAGE_S
 from mission.view.film_images import film
@@ -36,7 +35,7 @@ QUALITY = (cv2.IMWRITE_JPEG_QUALITY, 88)
 def main() -> None:
     pilot = load_follower(FOLLOWER)
     run = tempfile.TemporaryDirectory()
-    config = FlightConfig(world=FOLLOW_WORLD, owner=OwnerConfig(), seed=SEED, parameters=setup_of(pilot))
+    config = FlightConfig(world=FOLLOW_WORLD, owner=OwnerConfig(), seed=SEED)
     flight, companion = flight_with_companion(config, pilot, folder=Path(run.name))
     keep_for_replay(flight, action=lambda: companion.action)
     watch = watch_of(flight, companion, FOLLOWED_S)

@@ -15,7 +15,6 @@ from mission.flight_config import OwnerConfig
 from mission.follow.benchmark.conditions import BY_NAME
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.lockstep import flight_with_companion, follow_for
-from mission.follow.vehicle_setup import setup_of
 from mission.view.chase_camera import IMAGE_S
 from mission.view.film_images import film
 from mission.view.replay_file import keep_for_replay, load_recording
@@ -40,7 +39,7 @@ def main() -> None:
     owner = OwnerConfig(pace=condition.pace, numbers=dict(condition.numbers))
     stances: dict[int, Stance] = {}  # by the image of the film
     with tempfile.TemporaryDirectory() as folder:
-        config = FlightConfig(world=FOLLOW_WORLD, owner=owner, seed=SEED, parameters=setup_of(pilot))
+        config = FlightConfig(world=FOLLOW_WORLD, owner=owner, seed=SEED)
         flight, companion = flight_with_companion(config, pilot, folder=Path(folder), guard=GuardSettings())
         keep_for_replay(flight, action=lambda: companion.action)
 

@@ -12,7 +12,6 @@ from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.lockstep import flight_with_companion, follow_for
-from mission.follow.vehicle_setup import setup_of
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.names import FOLLOWER
 from policies.companion.skills.load_skill import load_follower
@@ -26,11 +25,8 @@ def main() -> None:
     mpl.use("Agg")
     import matplotlib.pyplot as plt  # noqa: PLC0415  after the choice of the backend
 
-    pilot = load_follower(FOLLOWER)
-    config = FlightConfig(
-        world=FOLLOW_WORLD, owner=OwnerConfig(pace="walk"), seed=SEED, wind_m_s=WIND_M_S, parameters=setup_of(pilot)
-    )
-    flight, companion = flight_with_companion(config, pilot, guard=GuardSettings())
+    config = FlightConfig(world=FOLLOW_WORLD, owner=OwnerConfig(pace="walk"), seed=SEED, wind_m_s=WIND_M_S)
+    flight, companion = flight_with_companion(config, load_follower(FOLLOWER), guard=GuardSettings())
     owner: list[float] = []
 
     def look(watch: FollowWatch) -> None:

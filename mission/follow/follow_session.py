@@ -39,7 +39,6 @@ from mission.follow.follow_options import follow_config
 from mission.follow.follow_scoring import FollowWatch, Smoothness, taken_over
 from mission.follow.guard_report import guard_figures, guard_row, guard_text
 from mission.follow.lockstep import flight_with_companion
-from mission.follow.vehicle_setup import setup_of
 from mission.kernel_loading import load_kernels
 from mission.run_folder import OwnFiles, run_folder
 from mission.script import Drone, set_out
@@ -78,7 +77,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     speed = speed_of(options.speed)
     guard = guard_of(options.has_guard, options.guard_settings)
     pilot, name = chosen_pilot(options)
-    config = follow_config(options, setup_of(pilot), has_scanner=isinstance(pilot, NavigationPilot))
+    config = follow_config(options, has_scanner=isinstance(pilot, NavigationPilot))
     foxglove, links = open_foxglove(options, held), _links(options, config, speed)
     page = open_page(options.view_port) if options.has_view else None
     folder = held.enter_context(run_folder(options.run_folder))

@@ -9,14 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory_pair
+from common.params import Parameter
 from mission.flight import Flight, FlightConfig
 from mission.flight_base import FlightBase
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.late_link import LateLink
-from mission.follow.vehicle_setup import knowing_brakes
+from mission.follow.vehicle_setup import BRAKE_PARAMETERS, as_trained, owner_brake
 from mission.script import set_out
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
+from policies.companion.guard.guard import Guard
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import MemoryCamera
 from policies.companion.skills.driving import Driving
@@ -53,6 +55,9 @@ def flight_with_companion(
         guard: who bounds the pilot; None: as it ships.
     """
     vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
+    is_ours = make_flight is Flight
+    if is_ours and not isinstance(pilot, NavigationPilot):
+        config = as_trained(config, pilot)
     flight = make_flight(config, links=[vehicle_end, *links], folder=folder)
     if flight.onboard is None:
         raise ValueError("a companion needs a flight with an owner")
@@ -62,15 +67,26 @@ def flight_with_companion(
     if isinstance(pilot, NavigationPilot):
         skill = Navigating(pilot, camera=camera, guard=guard)
     else:
-        known = guard or GuardSettings()
-        if isinstance(flight, Flight):
-            known = knowing_brakes(known, flight.params)
-        skill = Following(camera, pilot, known)
+        skill = Following(camera, pilot, guard or GuardSettings())
+        if is_ours and skill.guard is not None:
+            _tell_brakes(flight, skill.guard)
     lag_s = config.owner.numbers.get("setpoint_lag_s", 0.0) if config.owner is not None else 0.0
     link = LateLink(companion_end, lag_s, lambda: flight.time_us) if lag_s > 0.0 else companion_end
     companion = Companion(link, skill, is_reported=is_reported, wall_s=wall_s)
     flight.computers.append(companion)
     return flight, companion
+
+
+def _tell_brakes(flight: FlightBase, guard: Guard) -> None:
+    """Tells a guard how our vehicle brakes, and again whenever its parameters change."""
+    assert isinstance(flight, Flight)  # noqa: S101  (for the type checker)
+
+    def tell(changed: Parameter | None = None) -> None:
+        if changed is None or changed.name in BRAKE_PARAMETERS:
+            guard.reckon_with_brake(owner_brake(flight.config, flight.params))
+
+    tell()
+    flight.params.on_change(tell)
 
 
 def follow_for(

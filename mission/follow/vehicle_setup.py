@@ -1,32 +1,46 @@
 """How our flight controller is set to follow, and what a guard has to know of that.
 
-In: who flies, and a flight's parameters. Out: those that it is set by, and a guard that knows how it brakes.
+In: who flies, and the parameters of a flight. Out: those that it is set by, and with what the vehicle brakes.
 """
 
+from common.airframe import load_airframe
 from common.params import ParameterTable
+from mission.flight_config import FlightConfig, flight_parameters
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.skills.following import Pilot
-from policies.companion.vector_pilot import NavigationPilot
 from policies.tasks.follow_me.observe import TRACKED
-from policies.tasks.follow_me.tracked.quick_vehicle import QUICK, brake_m_s2
+from policies.tasks.follow_me.tracked.quick_vehicle import MEASURED, QUICK, brake_m_s2
 
 BY_SIGHT = {"EKF2_EV_CTRL": 4.0}
 """The parameter by which our flight controller uses the velocity that the companion sees while GNSS is away."""
+_TILT = "MPC_TILTMAX_AIR"
+BRAKE_PARAMETERS = (*QUICK, _TILT)
+"""Those that tell how a vehicle brakes."""
 
 
-def setup_of(pilot: Pilot | NavigationPilot) -> dict[str, float]:
-    """The parameters that a pilot's vehicle is set by, as in training: who goes by the senses has a quick one."""
-    goes_by_senses = not isinstance(pilot, NavigationPilot) and pilot.kind == TRACKED
-    return BY_SIGHT | QUICK if goes_by_senses else dict(BY_SIGHT)
-
-
-def knowing_brakes(guard: GuardSettings, table: ParameterTable) -> GuardSettings:
-    """The guard that knows how our vehicle with these parameters brakes, unless it was told otherwise.
+def as_trained(config: FlightConfig, pilot: Pilot) -> FlightConfig:
+    """The flight of our own flight controller, as quick as where its pilot was trained, unless it says otherwise.
 
     Args:
-        guard: as set.
+        config: of a multirotor; any other vehicle has no such parameters, and stays as it is.
+        pilot: who goes by the senses was trained with a quick vehicle.
+    """
+    table = flight_parameters(config, load_airframe(config.airframe))
+    if pilot.kind != TRACKED or any(name not in table for name in QUICK):
+        return config
+    return config.model_copy(update={"parameters": QUICK | config.parameters})
+
+
+def owner_brake(config: FlightConfig, table: ParameterTable) -> float:
+    """With which a guard takes our vehicle to brake before people [m/s²].
+
+    Args:
+        config: of the flight; where nothing was measured it brakes no harder than any vehicle is taken to.
         table: of the flight controller; of one that does not say how fast it speeds up nothing is known.
     """
-    if "owner_brake" in guard.model_fields_set or not all(name in table for name in QUICK):
-        return guard
-    return guard.model_copy(update={"owner_brake": brake_m_s2(table["MPC_ACC_HOR"], table["MPC_JERK_MAX"])})
+    usual = GuardSettings().owner_brake
+    if any(name not in table for name in BRAKE_PARAMETERS):
+        return usual
+    told = brake_m_s2(table["MPC_ACC_HOR"], table["MPC_JERK_MAX"], table.si(_TILT))
+    is_measured = config.engine == "native" and config.airframe in MEASURED
+    return told if is_measured else min(told, usual)

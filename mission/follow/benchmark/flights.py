@@ -18,7 +18,7 @@ from mission.flight_config import FlightConfig, OwnerConfig
 from mission.follow.benchmark.conditions import Condition
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.lockstep import flight_with_companion, follow_for
-from mission.follow.vehicle_setup import setup_of
+from mission.follow.vehicle_setup import BY_SIGHT
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.skills.following import Pilot
 from policies.tasks.follow_me.track import Ranges, spans
@@ -55,8 +55,8 @@ class Outcome:
     trouble: str  # why the companion gave up
 
 
-def flight_of(condition: Condition, seed: int, pilot: Pilot) -> FlightConfig:
-    """What a pilot's flight in a condition is made from: trees, and wind if it is not said, by the seed."""
+def flight_of(condition: Condition, seed: int) -> FlightConfig:
+    """What a flight in a condition is made from: how many trees, and how much wind if it is not said, by the seed."""
     k = seed // 2
     world = FOLLOW_WORLD.model_copy(update={"trees_per_ha": TREES_PER_HA[k % 3], "seed": seed})
     owner = OwnerConfig(pace=condition.pace, numbers=dict(condition.numbers))
@@ -68,7 +68,7 @@ def flight_of(condition: Condition, seed: int, pilot: Pilot) -> FlightConfig:
         wind_m_s=wind_m_s,
         airframe=condition.airframe,
         sensor_roughness=condition.sensor_roughness,
-        parameters=setup_of(pilot),
+        parameters=dict(BY_SIGHT),
     )
 
 
@@ -83,7 +83,7 @@ def fly(
     """One flight; one that never began to follow did not follow at all."""
     pilot.reset()
     kept = kept or KeptFlight()
-    flight, companion = flight_with_companion(flight_of(condition, seed, pilot), pilot, folder=kept.folder, guard=guard)
+    flight, companion = flight_with_companion(flight_of(condition, seed), pilot, folder=kept.folder, guard=guard)
     kept.begin(flight, companion)
     is_hidden: list[bool] = []
     has_touched = False

@@ -68,6 +68,7 @@ class Guard:
 
     def __init__(self, settings: GuardSettings, senses: Senses) -> None:
         self.settings = self._usual = settings
+        self._set = settings.model_fields_set
         self.senses = senses
         self._people, self._rollouts = _rules(settings)
         self.stance = Stance.FREE
@@ -96,9 +97,18 @@ class Guard:
 
     def reckon_with(self, late_s: float) -> None:
         """Setpoints take so much longer [s] than usual to reach the vehicle."""
-        if late_s == self._late_s:
-            return
-        self._late_s, usual = late_s, self._usual
+        if late_s != self._late_s:
+            self._late_s = late_s
+            self._make_rules()
+
+    def reckon_with_brake(self, brake: float) -> None:
+        """The vehicle brakes so hard before people [m/s²], unless `owner_brake` was set."""
+        if "owner_brake" not in self._set:
+            self._usual = self._usual.model_copy(update={"owner_brake": brake})
+            self._make_rules()
+
+    def _make_rules(self) -> None:
+        usual, late_s = self._usual, self._late_s
         later = {"reaction_s": usual.reaction_s + late_s, "hears_s": usual.hears_s + late_s}
         self.settings = usual.model_copy(update=later)
         self._people, self._rollouts = _rules(self.settings)

@@ -21,7 +21,6 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.names import FOLLOWER
 from policies.companion.pilot import PilotError
 from policies.datasets.reader import DatasetReader
-from policies.experts.follower import ScriptedFollower
 from policies.tasks.follow_me.follow_me_params import FOLLOW_PARAMS
 from policies.tasks.follow_me.observe import EGO, TRACKED
 from tests.unit.mission.follow.goto_flight import advance
@@ -76,14 +75,13 @@ def test_conditions_can_be_told_apart():
 
 
 def test_a_condition_sets_wind_and_airframe():
-    names, pilot = ("walk", "wind", "f550", "x500-fitted", "f550-fitted"), ScriptedFollower()
-    flights = [flight_of(BY_NAME[name], 2_000_003, pilot) for name in names]
+    flights = [flight_of(BY_NAME[name], 2_000_003) for name in ("walk", "wind", "f550", "x500-fitted", "f550-fitted")]
     assert [each.wind_m_s for each in flights] == [2.0, 10.0, 2.0, 2.0, 2.0]
     assert [each.airframe for each in flights] == ["x500", "x500", "f550", "x500-fitted", "f550-fitted"]
 
 
 def test_an_owner_who_crouches_does_so_before_the_camera_and_not_on_their_phone():
-    flight = Flight(flight_of(BY_NAME["crouch"], 2_000_003, ScriptedFollower()))
+    flight = Flight(flight_of(BY_NAME["crouch"], 2_000_003))
     try:
         advance(flight, 0.2)
         rows = flight.owner.cast.rows

@@ -2,31 +2,32 @@
 
 import pytest
 
-from autopilot.params import parameter_table
-from common.airframe import load_airframe
-from mission.flight_config import flight_parameters
-from mission.flight_settings import FollowOptions
+from common.airframe import AIRFRAME_FOLDER, load_airframe
+from mission.flight_config import FlightConfig, OwnerConfig, flight_parameters
 from mission.follow.benchmark.pilots import any_pilot
-from mission.follow.follow_options import follow_config
-from mission.follow.vehicle_setup import knowing_brakes, setup_of
+from mission.follow.vehicle_setup import as_trained, owner_brake
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.names import FOLLOWER
-from policies.companion.skills.load_skill import load_follower
 from policies.experts.follower import ScriptedFollower
 from policies.tasks.follow_me.follow_me import FollowMe
 from policies.tasks.follow_me.settings import FollowSettings
-from policies.tasks.follow_me.tracked.quick_vehicle import QUICK
-from sim.bodies.vehicles import class_of
+from policies.tasks.follow_me.tracked.quick_vehicle import QUICK, QUICK_BRAKE_M_S2
 from tests.unit.mission.follow.follow_flight import following
 
 USUAL = GuardSettings().owner_brake
 
 
-def brake_of(airframe, guard=None, **parameters):
-    table = parameter_table(load_airframe(airframe), vehicle=class_of(load_airframe(airframe)).vehicle)
-    for name, value in parameters.items():
-        table.set(name, value)
-    return knowing_brakes(guard or GuardSettings(), table).owner_brake
+def brake_of(airframe, engine="native", **parameters):
+    config = FlightConfig(airframe=airframe, engine=engine, parameters=parameters)
+    return owner_brake(config, flight_parameters(config, load_airframe(airframe)))
+
+
+def quick(**changed):
+    """A flight by the policy that ships, which goes by the senses, and its guard."""
+    pilot = any_pilot(FOLLOWER)
+    pilot.reset()
+    flight, companion = following(pilot=pilot, **changed)
+    return flight, companion.skill.guard
 
 
 def test_a_vehicle_as_it_ships_brakes_as_a_guard_takes_any_vehicle_to():
@@ -34,7 +35,7 @@ def test_a_vehicle_as_it_ships_brakes_as_a_guard_takes_any_vehicle_to():
 
 
 def test_a_quicker_vehicle_is_taken_to_brake_harder_and_a_slower_one_more_gently():
-    assert brake_of("x500", MPC_ACC_HOR=6.0, MPC_JERK_MAX=30.0) == pytest.approx(1.5 * USUAL)
+    assert brake_of("x500", **QUICK) == pytest.approx(1.5 * USUAL)
     assert brake_of("x500", MPC_ACC_HOR=2.0) == pytest.approx(0.5 * USUAL)
 
 
@@ -43,34 +44,33 @@ def test_what_it_takes_long_to_come_to_does_not_count():
     assert brake_of("x500", MPC_JERK_MAX=5.0) < 0.5 * USUAL
 
 
+def test_nor_what_it_may_not_lean_for():
+    assert brake_of("x500", MPC_TILTMAX_AIR=20.0, **QUICK) < 0.5 * USUAL
+
+
 def test_more_than_was_measured_is_not_reckoned_with():
     assert brake_of("x500", MPC_ACC_HOR=15.0, MPC_JERK_MAX=500.0) == pytest.approx(1.5 * USUAL)
 
 
-def test_a_guard_that_was_told_is_not_told_again():
-    assert brake_of("x500", GuardSettings(owner_brake=2.0), MPC_ACC_HOR=6.0, MPC_JERK_MAX=30.0) == 2.0
+@pytest.mark.parametrize("engine", ["native", "jsbsim", "pybullet"])
+def test_where_nothing_was_measured_it_brakes_no_harder_than_any_vehicle(engine, tmp_path):
+    own = tmp_path / "mine.toml"
+    own.write_text((AIRFRAME_FOLDER / "x500.toml").read_text())
+    airframe = str(own) if engine == "native" else "x500"
+    assert brake_of(airframe, engine, **QUICK) == USUAL
+    assert brake_of(airframe, engine, MPC_ACC_HOR=2.0) == pytest.approx(0.5 * USUAL)
 
 
 def test_of_a_vehicle_without_these_parameters_nothing_is_known():
     assert brake_of("rover") == USUAL
-
-
-@pytest.mark.parametrize("board", ["own", "px4"])
-def test_only_our_own_flight_controller_is_set_so(board):
-    config = follow_config(FollowOptions(board=board), QUICK)
-    assert set(QUICK).isdisjoint(config.parameters) == (board != "own")
-
-
-def test_what_the_user_sets_stays():
-    config = follow_config(FollowOptions(parameters=["MPC_ACC_HOR=3"]), QUICK)
-    assert flight_parameters(config, load_airframe("x500"))["MPC_ACC_HOR"] == 3.0
+    assert as_trained(FlightConfig(airframe="rover"), any_pilot(FOLLOWER)).parameters == {}
 
 
 def test_who_goes_by_the_senses_has_a_quick_vehicle_and_nobody_else():
     """As where they were trained."""
-    assert setup_of(any_pilot(FOLLOWER)).items() >= QUICK.items()
-    assert set(QUICK).isdisjoint(setup_of(ScriptedFollower()))
-    assert set(QUICK).isdisjoint(setup_of(load_follower("navigate-rover-follow")))
+    config = FlightConfig(owner=OwnerConfig(), parameters={"MPC_JERK_MAX": 25.0})
+    assert as_trained(config, any_pilot(FOLLOWER)).parameters == QUICK | {"MPC_JERK_MAX": 25.0}
+    assert as_trained(config, ScriptedFollower()) == config
 
 
 def test_it_is_trained_with_what_it_flies():
@@ -79,6 +79,18 @@ def test_it_is_trained_with_what_it_flies():
         assert (rows["accel_max_xy"] == QUICK["MPC_ACC_HOR"]).all() == is_quick
 
 
-def test_the_guard_of_a_flight_knows_its_vehicle():
-    _, companion = following(parameters=QUICK)
-    assert companion.skill.guard.settings.owner_brake == pytest.approx(1.5 * USUAL)
+def test_the_guard_of_a_flight_knows_its_vehicle_as_training_does():
+    flight, guard = quick()
+    assert guard.settings.owner_brake == QUICK_BRAKE_M_S2
+    flight.params.set("MPC_ACC_HOR", 2.0)  # as by a ground station
+    assert guard.settings.owner_brake == pytest.approx(0.5 * USUAL)
+    guard.reckon_with(0.1)
+    assert guard.settings.owner_brake == pytest.approx(0.5 * USUAL)
+    assert guard.settings.reaction_s == pytest.approx(GuardSettings().reaction_s + 0.1)
+
+
+def test_a_guard_that_was_told_is_not_told_again():
+    flight, guard = quick(settings={"owner_brake": 2.0})
+    assert guard.settings.owner_brake == 2.0
+    flight.params.set("MPC_ACC_HOR", 5.0)
+    assert guard.settings.owner_brake == 2.0
