@@ -14,7 +14,7 @@ from mission.flight import Flight, FlightConfig
 from mission.flight_base import FlightBase
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.late_link import LateLink
-from mission.follow.vehicle_setup import BRAKE_PARAMETERS, as_trained, owner_brake
+from mission.follow.vehicle_setup import as_trained, owner_brake
 from mission.script import set_out
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
@@ -26,6 +26,7 @@ from policies.companion.skills.following import Following, Pilot
 from policies.companion.skills.navigating import Navigating
 from policies.companion.skills.skill import Skill
 from policies.companion.vector_pilot import DrivingPilot, NavigationPilot
+from policies.tasks.follow_me.tracked.quick_vehicle import BRAKE_PARAMETERS
 from sim.world.world import WorldMap
 
 _SET_OUT_S, _ENGAGE_S = 40.0, 5.0  # at most, until it hovers, and until it follows

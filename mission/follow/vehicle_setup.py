@@ -9,20 +9,17 @@ from mission.flight_config import FlightConfig, flight_parameters
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.skills.following import Pilot
 from policies.tasks.follow_me.observe import TRACKED
-from policies.tasks.follow_me.tracked.quick_vehicle import MEASURED, QUICK, brake_m_s2
+from policies.tasks.follow_me.tracked.quick_vehicle import BRAKE_PARAMETERS, MEASURED, QUICK, brake_m_s2
 
 BY_SIGHT = {"EKF2_EV_CTRL": 4.0}
 """The parameter by which our flight controller uses the velocity that the companion sees while GNSS is away."""
-_TILT = "MPC_TILTMAX_AIR"
-BRAKE_PARAMETERS = (*QUICK, _TILT)
-"""Those that tell how a vehicle brakes."""
 
 
 def as_trained(config: FlightConfig, pilot: Pilot) -> FlightConfig:
     """The flight of our own flight controller, as quick as where its pilot was trained, unless it says otherwise.
 
     Args:
-        config: of a multirotor; any other vehicle has no such parameters, and stays as it is.
+        config: of a vehicle that has these parameters; any other stays as it is.
         pilot: who goes by the senses was trained with a quick vehicle.
     """
     table = flight_parameters(config, load_airframe(config.airframe))
@@ -41,6 +38,6 @@ def owner_brake(config: FlightConfig, table: ParameterTable) -> float:
     usual = GuardSettings().owner_brake
     if any(name not in table for name in BRAKE_PARAMETERS):
         return usual
-    told = brake_m_s2(table["MPC_ACC_HOR"], table["MPC_JERK_MAX"], table.si(_TILT))
+    brake = brake_m_s2(*(table[name] for name in BRAKE_PARAMETERS))
     is_measured = config.engine == "native" and config.airframe in MEASURED
-    return told if is_measured else min(told, usual)
+    return brake if is_measured else min(brake, usual)

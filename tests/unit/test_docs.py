@@ -58,7 +58,7 @@ RUN_BY_OTHERS = (
     "pytest ",  # tests/unit/mission/pytest_plugin
     f"{HONEYGUIDE} replay ",  # tests/unit/mission/view/test_replay.py
     f"{HONEYGUIDE} review ",  # tests/unit/mission/review/test_review_session.py
-    f"{HONEYGUIDE} benchmark ",  # tests/unit/mission/follow/test_benchmark.py
+    f"{HONEYGUIDE} benchmark ",  # tests/unit/mission/follow/benchmark/test_benchmark.py
     f"{HONEYGUIDE} test ",  # tests/unit/mission/scenario/test_command.py, tests/system/scenarios
     f"{HONEYGUIDE} campaign ",  # tests/system/campaigns
     f"{HONEYGUIDE} dataset ",  # tests/system/companion/test_recorded_flight.py, tests/unit/mission/dataset

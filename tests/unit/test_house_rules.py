@@ -38,6 +38,7 @@ SPEAK_OF_ROTORS = {
     "mission/view/shapes.py": "the shape of a multirotor",
     "mission/review/summary.py": "MAVLink's names of vehicle types, in logs of others",
     "mission/console/option_checks.py": "which engine moves what",
+    "policies/tasks/follow_me/tracked/quick_vehicle.py": "the parameters of a multirotor that follows",
     "sim/engines/bullet.py": "which classes Bullet moves",
     "sim/boards/betaflight.py": "Betaflight flies multirotors alone",
     "sim/boards/betaflight_sticks.py": "its sticks",

@@ -8,23 +8,24 @@ from math import radians, tan
 from common.geodesy import GRAVITY_M_S2
 
 QUICK = {"MPC_ACC_HOR": 6.0, "MPC_JERK_MAX": 30.0}
+BRAKE_PARAMETERS = (*QUICK, "MPC_TILTMAX_AIR")
+"""Those that tell how a vehicle brakes, as `brake_m_s2` takes them."""
 MEASURED = "x500", "f450", "f550", "x500-fitted", "f550-fitted"  # airframes, by bench.follow.braking
 _BRAKES = 0.925  # of the acceleration that is allowed; measured, as
 _JERK_S, _MOST_M_S2 = 0.2, 6.0  # in which it comes to it, and the most that was measured
 _WIND_M_S2 = 3.0  # what wind may take of the level thrust; guess
-_TILT_RAD = radians(45.0)
 
 
-def brake_m_s2(acceleration: float, jerk: float, tilt_rad: float = _TILT_RAD) -> float:
+def brake_m_s2(acceleration: float, jerk: float, tilt_deg: float) -> float:
     """With which it is taken to brake [m/s²].
 
     Args:
         acceleration: MPC_ACC_HOR [m/s²]; more than was measured does not count.
         jerk: MPC_JERK_MAX [m/s³]; what it takes long to come to does not, either.
-        tilt_rad: MPC_TILTMAX_AIR; nor what it may not lean for, against the wind.
+        tilt_deg: MPC_TILTMAX_AIR; nor what it may not lean for, against the wind.
     """
-    leaning = max(GRAVITY_M_S2 * tan(tilt_rad) - _WIND_M_S2, 0.1)
+    leaning = max(GRAVITY_M_S2 * tan(radians(tilt_deg)) - _WIND_M_S2, 0.1)
     return _BRAKES * min(acceleration, _JERK_S * jerk, leaning, _MOST_M_S2)
 
 
-QUICK_BRAKE_M_S2 = brake_m_s2(QUICK["MPC_ACC_HOR"], QUICK["MPC_JERK_MAX"])
+QUICK_BRAKE_M_S2 = brake_m_s2(QUICK["MPC_ACC_HOR"], QUICK["MPC_JERK_MAX"], 45.0)
