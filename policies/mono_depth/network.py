@@ -46,8 +46,8 @@ class DepthNetwork(nn.Module):
         self.halves = conv_block(4, 24, stride=2, size=5)
         self.quarters = nn.Sequential(conv_block(24, 40, stride=2), conv_block(40, 40))
         self.eighths = nn.Sequential(conv_block(40, 64, stride=2), conv_block(64, 64), conv_block(64, 64, dilation=2))
-        self.narrow = nn.Sequential(conv_block(64, 64), conv_block(64, 32, size=1))
-        self.up_quarters = nn.Sequential(conv_block(72, 40), conv_block(40, 24, size=1))
+        self.narrow = nn.Sequential(conv_block(64, 64), conv_block(64, 32, size=1), _doubled())
+        self.up_quarters = nn.Sequential(conv_block(72, 40), conv_block(40, 24, size=1), _doubled())
         self.up_halves = nn.Sequential(conv_block(48, 32), nn.Conv2d(32, BINS + 1, 1))
 
     def forward(self, colours: Tensor, ground: Tensor) -> Tensor:
@@ -57,13 +57,13 @@ class DepthNetwork(nn.Module):
         halves = self.halves(torch.cat((levels, ground[:, None]), dim=1))
         quarters = self.quarters(halves)
         wide = self.narrow(self.eighths(quarters))
-        wide = self.up_quarters(torch.cat((_doubled(wide), quarters), dim=1))
-        out: Tensor = self.up_halves(torch.cat((_doubled(wide), halves), dim=1))
+        wide = self.up_quarters(torch.cat((wide, quarters), dim=1))
+        out: Tensor = self.up_halves(torch.cat((wide, halves), dim=1))
         return out
 
 
-def _doubled(maps: Tensor) -> Tensor:
-    return nn.functional.interpolate(maps, scale_factor=2.0, mode="nearest")
+def _doubled() -> nn.Upsample:
+    return nn.Upsample(scale_factor=2, mode="nearest")
 
 
 class MonoDepth:

@@ -187,7 +187,7 @@ class LocalMap:
         is_seen = np.bincount(sectors[is_level], minlength=_FAN) > 0
         units = _FAN_UNITS[is_seen]
         free_m = np.where(np.isfinite(nearest_m), nearest_m - CELL_M, _NO_RETURN_M)[is_seen]
-        self._open(here, units, free_m, now_us)
+        self._open(here[None], units, free_m, now_us)
 
     def _open_ahead(self, place: Floats, velocity: Floats, now_us: int) -> None:
         """Notes as free, but for what is known to be solid, where somebody walks: they look where they go.
@@ -220,19 +220,19 @@ class LocalMap:
         far_m = np.repeat(ranges_m.astype(np.float64), _RAYS)
         is_return = far_m < limit_m
         self.has_depth = bool(is_return.any())
-        self._open(here, units, np.where(is_return, far_m - CELL_M, REACH_M), now_us)
+        self._open(here[None], units, np.where(is_return, far_m - CELL_M, REACH_M), now_us)
         is_near = is_return & (far_m < REACH_M)
         rows, columns = cells_of(here + far_m[is_near, None] * units[is_near])
         self._solid_us[rows, columns] = now_us
 
-    def _open(self, here: Floats, units: Floats, free_m: Floats, now_us: int) -> None:
-        """Notes as free what lies within so much in each direction, and where the vehicle itself is."""
+    def _open(self, heres: Floats, units: Floats, free_m: Floats, now_us: int) -> None:
+        """Notes as free what lies within so much in each direction, from some places, and these themselves."""
         steps = np.arange(0.0, REACH_M, 0.8 * CELL_M)
-        points = here + units[:, None] * steps[None, :, None]
-        for seen in (points[steps[None] < free_m[:, None]], here + self._hull):
-            rows, columns = cells_of(seen)
+        ways = (units[:, None] * steps[None, :, None])[steps[None] < free_m[:, None]]
+        for seen in (ways, self._hull):
+            rows, columns = cells_of((heres[:, None] + seen).reshape(-1, 2))
             self._free_us[rows, columns] = now_us
-        rows, columns = cells_of(here + self._own)
+        rows, columns = cells_of((heres[:, None] + self._own).reshape(-1, 2))
         is_solid = self._solid_us[rows, columns] > now_us - _SOLID_US
         self._free_us[rows[~is_solid], columns[~is_solid]] = now_us
 
@@ -244,8 +244,8 @@ class LocalMap:
         far_m = float(np.hypot(*way))
         unit = way / max(far_m, 1e-3)
         aside = np.array([-unit[1], unit[0]]) * CELL_M
-        for cells in np.arange(-2.0, 2.5, 0.5):  # so fine that none is passed over, whatever way it leads
-            self._open(here + cells * aside, unit[None], np.array([far_m]), now_us)
+        beside = np.arange(-2.0, 2.5, 0.5)  # so fine that none is passed over, whatever way it leads
+        self._open(here + beside[:, None] * aside, unit[None], np.array([far_m]), now_us)
 
     def clearance(self, pos_ned: Vector, now_us: int) -> Clearance:
         """What is known of places round a vehicle by now."""

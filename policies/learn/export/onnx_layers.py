@@ -1,5 +1,6 @@
 """Layers of networks that look at images, in an ONNX graph."""
 
+import torch
 from torch import nn
 
 from policies.learn.export.onnx_graph import Graph
@@ -29,6 +30,9 @@ def add_layers(graph: Graph, layers: nn.Sequential, images: str) -> str:
             case nn.MaxPool2d():
                 sizes = {"kernel_shape": [layer.kernel_size] * 2, "strides": [layer.stride] * 2}
                 images = graph.node("MaxPool", images, **sizes)
+            case nn.Upsample(mode="nearest"):
+                factors = graph.weight(torch.tensor([1.0, 1.0, layer.scale_factor, layer.scale_factor]))
+                images = graph.node("Upsample", images, factors, mode="nearest")
             case Residual():
                 images = graph.node("Add", images, add_layers(graph, layer.layers, images))
             case nn.Flatten():
