@@ -105,7 +105,7 @@ def rule_m(config: FlightConfig, speed: float) -> float:
 def main(
     airframes: Annotated[list[str] | None, typer.Argument(help="Default: those that were measured.")] = None,
     usual: Annotated[
-        bool, typer.Option("--usual", help="The flight controller as it is where nobody follows.")
+        bool, typer.Option("--usual", help="The flight controller as it is where nobody follows by the senses.")
     ] = False,
 ) -> None:
     """Prints the table."""

@@ -1,7 +1,8 @@
 """Pictures of flights that failed: the policy that ships, in harder conditions.
 
 `python -m docs.generate.failure_plots`. Writes docs/results/images/failures.png. Every flight is one of the table in
-docs/results/harder.md; another machine may round differently, and a flight then end otherwise.
+docs/results/harder.md that is of the usual vehicle; another machine may round differently, and a flight then end
+otherwise.
 """
 
 from dataclasses import dataclass, field
@@ -11,6 +12,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 
+from mission.flight_config import FlightConfig
 from mission.follow.benchmark.conditions import BY_NAME
 from mission.follow.benchmark.flights import SECONDS, flight_of
 from mission.follow.follow_scoring import FollowWatch
@@ -23,6 +25,7 @@ from policies.tasks.follow_me.tracked.keep_off import SLOW_S
 
 PLOT = Path(__file__).parents[1] / "results" / "images" / "failures.png"
 FLIGHTS = (("crossed", 3951063), ("twins", 3951055), ("gone-3-run-silent", 3951043))
+USUAL = {"MPC_ACC_HOR": 4.0, "MPC_JERK_MAX": 20.0}
 SHOWN_S = 16.0
 BEFORE_S = 4.0  # of these are from before it left the band
 MARKS_S = 4.0
@@ -42,11 +45,16 @@ class Seen:
     has_hit: bool = False
 
 
+def _as_flown(config: FlightConfig) -> FlightConfig:
+    """With the vehicle of the table's rows."""
+    return config.model_copy(update={"parameters": config.parameters | USUAL})
+
+
 def fly(name: str, seed: int) -> Seen:
     """One flight of the benchmark, watched."""
     condition = BY_NAME[name]
     flight, companion = flight_with_companion(
-        flight_of(condition, seed), load_follower(FOLLOWER), guard=GuardSettings()
+        _as_flown(flight_of(condition, seed)), load_follower(FOLLOWER), guard=GuardSettings()
     )
     seen = Seen(f"{condition.title},\nseed {seed}", flight.world.trees)
 

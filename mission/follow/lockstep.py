@@ -69,8 +69,8 @@ def flight_with_companion(
         skill = Navigating(pilot, camera=camera, guard=guard)
     else:
         skill = Following(camera, pilot, guard or GuardSettings())
-        if is_ours and skill.guard is not None:
-            _tell_brakes(flight, skill.guard)
+        if isinstance(flight, Flight) and skill.guard is not None:
+            _tell_brakes(flight, skill.guard, is_ours=is_ours)
     lag_s = config.owner.numbers.get("setpoint_lag_s", 0.0) if config.owner is not None else 0.0
     link = LateLink(companion_end, lag_s, lambda: flight.time_us) if lag_s > 0.0 else companion_end
     companion = Companion(link, skill, is_reported=is_reported, wall_s=wall_s)
@@ -78,13 +78,12 @@ def flight_with_companion(
     return flight, companion
 
 
-def _tell_brakes(flight: FlightBase, guard: Guard) -> None:
-    """Tells a guard how our vehicle brakes, and again whenever its parameters change."""
-    assert isinstance(flight, Flight)  # noqa: S101  (for the type checker)
+def _tell_brakes(flight: Flight, guard: Guard, *, is_ours: bool) -> None:
+    """Tells a guard how a vehicle brakes, whose inner loops may be another's, and again when its parameters change."""
 
     def tell(changed: Parameter | None = None) -> None:
         if changed is None or changed.name in BRAKE_PARAMETERS:
-            guard.reckon_with_brake(owner_brake(flight.config, flight.params))
+            guard.reckon_with_brake(owner_brake(flight.config, flight.params, is_ours=is_ours))
 
     tell()
     flight.params.on_change(tell)

@@ -16,11 +16,11 @@ BY_SIGHT = {"EKF2_EV_CTRL": 4.0}
 
 
 def as_trained(config: FlightConfig, pilot: Pilot) -> FlightConfig:
-    """The flight of our own flight controller, as quick as where its pilot was trained, unless it says otherwise.
+    """The flight of our own flight controller, as quick as where its pilot is trained, unless it says otherwise.
 
     Args:
         config: of a vehicle that has these parameters; any other stays as it is.
-        pilot: who goes by the senses was trained with a quick vehicle.
+        pilot: who goes by the senses is trained with a quick vehicle.
     """
     table = flight_parameters(config, load_airframe(config.airframe))
     if pilot.kind != TRACKED or any(name not in table for name in QUICK):
@@ -28,16 +28,17 @@ def as_trained(config: FlightConfig, pilot: Pilot) -> FlightConfig:
     return config.model_copy(update={"parameters": QUICK | config.parameters})
 
 
-def owner_brake(config: FlightConfig, table: ParameterTable) -> float:
+def owner_brake(config: FlightConfig, table: ParameterTable, *, is_ours: bool = True) -> float:
     """With which a guard takes our vehicle to brake before people [m/s²].
 
     Args:
         config: of the flight; where nothing was measured it brakes no harder than any vehicle is taken to.
         table: of the flight controller; of one that does not say how fast it speeds up nothing is known.
+        is_ours: all of it is our own, down to the motors.
     """
     usual = GuardSettings().owner_brake
     if any(name not in table for name in BRAKE_PARAMETERS):
         return usual
     brake = brake_m_s2(*(table[name] for name in BRAKE_PARAMETERS))
-    is_measured = config.engine == "native" and config.airframe in MEASURED
+    is_measured = is_ours and config.engine == "native" and config.airframe in MEASURED
     return brake if is_measured else min(brake, usual)

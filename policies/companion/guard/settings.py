@@ -162,8 +162,8 @@ class GuardSettings(BaseModel):
 
     @property
     def changed(self) -> dict[str, float]:
-        """The numbers that are not as they ship."""
-        return self.model_dump(exclude={"is_on"}, exclude_defaults=True)
+        """The numbers that were set, even to what they ship as: a vehicle may tell a guard another."""
+        return self.model_dump(exclude={"is_on"}, exclude_unset=True)
 
     @model_validator(mode="after")
     def _rises(self) -> Self:

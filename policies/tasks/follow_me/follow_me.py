@@ -58,7 +58,7 @@ from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS
 from policies.tasks.follow_me.settings import FollowSettings
 from policies.tasks.follow_me.task_cameras import Eyes
 from policies.tasks.follow_me.tracked.keep_off import keep_off
-from policies.tasks.follow_me.tracked.quick_vehicle import QUICK, QUICK_BRAKE_M_S2
+from policies.tasks.follow_me.tracked.quick_vehicle import QUICK, trained_brake_m_s2
 from policies.tasks.follow_me.tracked.sight_model import make_tracked, sense
 from policies.tasks.follow_me.tracked.vector import TRACKED_ELEMENTS
 from policies.tasks.follow_me.world import FOLLOW_WORLD
@@ -289,5 +289,5 @@ def _rules(settings: FollowSettings, layout: Layout) -> Any:
     rules.has_privileged = int(bool(layout.privileged))
     rules.is_kept = int(settings.terrain == "kept")
     rules.decision_ticks = DECISION_TICKS
-    rules.keep_off = keep_off(brake=QUICK_BRAKE_M_S2)  # of who goes by the senses
+    rules.keep_off = keep_off(brake=trained_brake_m_s2(settings.airframes))  # of who goes by the senses
     return rules

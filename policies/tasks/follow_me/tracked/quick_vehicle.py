@@ -3,9 +3,11 @@
 So it stands sooner before who stops: 2.4 m from 4 m/s, not 3.1 m. At 8 m/s² it leans so far that its camera loses them.
 """
 
+from collections.abc import Iterable
 from math import radians, tan
 
 from common.geodesy import GRAVITY_M_S2
+from policies.tasks.follow_me.tracked.keep_off import OWNER_BRAKE_M_S2
 
 QUICK = {"MPC_ACC_HOR": 6.0, "MPC_JERK_MAX": 30.0}
 BRAKE_PARAMETERS = (*QUICK, "MPC_TILTMAX_AIR")
@@ -13,6 +15,7 @@ BRAKE_PARAMETERS = (*QUICK, "MPC_TILTMAX_AIR")
 MEASURED = "x500", "f450", "f550", "x500-fitted", "f550-fitted"  # airframes, by bench.follow.braking
 _BRAKES = 0.925  # of the acceleration that is allowed; measured, as
 _JERK_S, _MOST_M_S2 = 0.2, 6.0  # in which it comes to it, and the most that was measured
+_LEAST_M_S2 = 0.5  # below it no rule can be made
 _WIND_M_S2 = 3.0  # what wind may take of the level thrust; guess
 
 
@@ -25,7 +28,12 @@ def brake_m_s2(acceleration: float, jerk: float, tilt_deg: float) -> float:
         tilt_deg: MPC_TILTMAX_AIR; nor what it may not lean for, against the wind.
     """
     leaning = max(GRAVITY_M_S2 * tan(radians(tilt_deg)) - _WIND_M_S2, 0.1)
-    return _BRAKES * min(acceleration, _JERK_S * jerk, leaning, _MOST_M_S2)
+    return max(_BRAKES * min(acceleration, _JERK_S * jerk, leaning, _MOST_M_S2), _LEAST_M_S2)
 
 
 QUICK_BRAKE_M_S2 = brake_m_s2(QUICK["MPC_ACC_HOR"], QUICK["MPC_JERK_MAX"], 45.0)
+
+
+def trained_brake_m_s2(airframes: Iterable[str]) -> float:
+    """With which a guard takes quick vehicles of these airframes to brake [m/s²]: not measured, as any vehicle."""
+    return QUICK_BRAKE_M_S2 if set(airframes) <= set(MEASURED) else OWNER_BRAKE_M_S2

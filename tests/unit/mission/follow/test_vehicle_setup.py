@@ -11,7 +11,7 @@ from policies.companion.names import FOLLOWER
 from policies.experts.follower import ScriptedFollower
 from policies.tasks.follow_me.follow_me import FollowMe
 from policies.tasks.follow_me.settings import FollowSettings
-from policies.tasks.follow_me.tracked.quick_vehicle import QUICK, QUICK_BRAKE_M_S2
+from policies.tasks.follow_me.tracked.quick_vehicle import QUICK, QUICK_BRAKE_M_S2, trained_brake_m_s2
 from tests.unit.mission.follow.follow_flight import following
 
 USUAL = GuardSettings().owner_brake
@@ -73,10 +73,18 @@ def test_who_goes_by_the_senses_has_a_quick_vehicle_and_nobody_else():
     assert as_trained(config, ScriptedFollower()) == config
 
 
-def test_it_is_trained_with_what_it_flies():
+@pytest.mark.parametrize("airframe", ["x500", "x500+f450"])
+def test_it_is_trained_with_what_it_flies(airframe):
     for observation, is_quick in (("tracked", True), ("state", False)):
-        rows = FollowMe(FollowSettings(observation=observation), 2).rig.arrays.autopilot.control_params.numpy()
+        task = FollowMe(FollowSettings(observation=observation, airframe=airframe), 4)
+        task.reset(seed=3)
+        rows = task.rig.arrays.autopilot.control_params.numpy()
         assert (rows["accel_max_xy"] == QUICK["MPC_ACC_HOR"]).all() == is_quick
+
+
+def test_in_airframes_that_were_not_measured_it_is_trained_under_the_guard_that_they_would_have():
+    assert trained_brake_m_s2(("x500", "f450")) == QUICK_BRAKE_M_S2
+    assert trained_brake_m_s2(("x500", "mine.toml")) == USUAL
 
 
 def test_the_guard_of_a_flight_knows_its_vehicle_as_training_does():

@@ -210,7 +210,7 @@ def test_the_rule_bounds_what_an_episode_flies_near_others_if_there_is_a_guard()
     flown = []
     for guard in (0.0, 1.0):
         task = _task(guard=guard, start_distance_min_m=8.0, start_distance_max_m=8.0)
-        task.buffers.continuous.assign(np.tile(np.array([0.6, 0.0, 0.0, 0.0], np.float32), (32, 1)))
+        task.buffers.continuous.assign(np.tile(np.array([0.9, 0.0, 0.0, 0.0], np.float32), (32, 1)))
         for _ in range(10):
             task.step()
         flown.append(np.linalg.norm(task.follow.tracked.commands.numpy()["vel_ned"], axis=1))
