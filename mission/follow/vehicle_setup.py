@@ -6,10 +6,16 @@ In: who flies, and the parameters of a flight. Out: those that it is set by, and
 from common.airframe import load_airframe
 from common.params import ParameterTable
 from mission.flight_config import FlightConfig, flight_parameters
-from policies.companion.guard.settings import GuardSettings
 from policies.companion.skills.following import Pilot
 from policies.tasks.follow_me.observe import TRACKED
-from policies.tasks.follow_me.tracked.quick_vehicle import BRAKE_PARAMETERS, MEASURED, QUICK, brake_m_s2
+from policies.tasks.follow_me.tracked.keep_off import OWNER_BRAKE_M_S2
+from policies.tasks.follow_me.tracked.quick_vehicle import (
+    BRAKE_PARAMETERS,
+    MEASURED,
+    QUICK,
+    believed_m_s2,
+    brake_m_s2,
+)
 
 BY_SIGHT = {"EKF2_EV_CTRL": 4.0}
 """The parameter by which our flight controller uses the velocity that the companion sees while GNSS is away."""
@@ -36,9 +42,8 @@ def owner_brake(config: FlightConfig, table: ParameterTable, *, is_ours: bool = 
         table: of the flight controller; of one that does not say how fast it speeds up nothing is known.
         is_ours: all of it is our own, down to the motors.
     """
-    usual = GuardSettings().owner_brake
     if any(name not in table for name in BRAKE_PARAMETERS):
-        return usual
+        return OWNER_BRAKE_M_S2
     brake = brake_m_s2(*(table[name] for name in BRAKE_PARAMETERS))
     is_measured = is_ours and config.engine == "native" and config.airframe in MEASURED
-    return brake if is_measured else min(brake, usual)
+    return believed_m_s2(brake, is_measured=is_measured)

@@ -34,6 +34,11 @@ def brake_m_s2(acceleration: float, jerk: float, tilt_deg: float) -> float:
 QUICK_BRAKE_M_S2 = brake_m_s2(QUICK["MPC_ACC_HOR"], QUICK["MPC_JERK_MAX"], 45.0)
 
 
+def believed_m_s2(brake: float, *, is_measured: bool) -> float:
+    """What a guard takes of that [m/s²]: where it was not measured, no more than any vehicle brakes with."""
+    return brake if is_measured else min(brake, OWNER_BRAKE_M_S2)
+
+
 def trained_brake_m_s2(airframes: Iterable[str]) -> float:
-    """With which a guard takes quick vehicles of these airframes to brake [m/s²]: not measured, as any vehicle."""
-    return QUICK_BRAKE_M_S2 if set(airframes) <= set(MEASURED) else OWNER_BRAKE_M_S2
+    """With which a guard takes quick vehicles of these airframes to brake [m/s²]."""
+    return believed_m_s2(QUICK_BRAKE_M_S2, is_measured=set(airframes) <= set(MEASURED))
