@@ -5,7 +5,7 @@ its map of 16 x 16 is a person if the middle of somebody's chest is in it.
 """
 
 from dataclasses import dataclass
-from math import exp, log, sqrt
+from math import dist, exp, log, sqrt
 from pathlib import Path
 from typing import cast
 
@@ -29,6 +29,7 @@ _SAME_BODY = 0.15  # likewise, of pixels of one body
 _BODY_PX = (8, 4)  # to either side of a chest, where its body is looked for
 _COLOURS_SHORT = 1.12  # by which ranges by colours alone are too short; measured in flights
 _HALF_BODY_M = 0.09  # from the skin to the middle; measured in flights
+_ONE_BODY_M = 0.4  # two chests are farther apart than this, level
 _CHEST_M = (0.3, 0.3, 0.4)  # aside, up and down of its middle: nearly all of the body there is shirt
 _COLOURS_WITHIN_M = 6.0  # farther off, too few pixels are of nothing else
 _DARK = 0.2  # of the image's brightness: darker than this, a colour is noise
@@ -120,7 +121,7 @@ class PersonDetector:
             probability = 1.0 / (1.0 + exp(-float(scores[row, column])))
             has_depth = range_m != guess_m * _COLOURS_SHORT
             found.append(Detection(probability, chest, at, has_depth, _chest_colours(pixels, at, range_m)))
-        return sorted(found, key=lambda detection: -detection.probability)
+        return _bodies(sorted(found, key=lambda detection: -detection.probability))
 
 
 def peaks(scores: NDArray[np.float32], least: float) -> list[tuple[int, int]]:
@@ -131,6 +132,15 @@ def peaks(scores: NDArray[np.float32], least: float) -> list[tuple[int, int]]:
         if scores[row, column] >= beside.max():
             found.append((row, column))
     return found
+
+
+def _bodies(found: list[Detection]) -> list[Detection]:
+    """Those without what is of the body of one before: who is near is wider than two cells."""
+    kept: list[Detection] = []
+    for one in found:
+        if all(dist(one.chest_hfrd[:2], other.chest_hfrd[:2]) > _ONE_BODY_M for other in kept):
+            kept.append(one)
+    return kept
 
 
 def _checked_range(range_m: float, depth: NDArray[np.uint8], row: int, column: int) -> float | None:

@@ -31,7 +31,8 @@ _NEAREST_M = 0.1  # but by no more than this too near
 _STEADY = 0.3  # how much what was flown last counts beside what is wanted: not left, right and left again
 _SLOWER = 1.5  # how much a metre per second less counts besides: who goes slower and slower is left behind;
 _GRAZING = 4.0  # [1/s] how much a metre nearer counts than it should keep off besides, where it may:
-_SLACK_M = 0.25  # so much, since the map, and how a vehicle answers, are known as well as that
+_SLACK_M = 0.25  # so much, since the map, and how a vehicle answers, are known as well as that;
+_BUMP_M = 0.25  # so much less may be a touch
 _THAT_WAY = 0.5  # whoever turns by 60 degrees and more does not go there at all
 
 
@@ -40,7 +41,8 @@ class _Judged:
     """What becomes of candidates, one element of each."""
 
     is_clear: NDArray[np.bool_]  # of what is solid, and where nobody has looked
-    is_allowed: NDArray[np.bool_]  # by the rule of people
+    too_fast: Floats  # [m/s] by how much it comes nearer to somebody than the rule of people lets it; 0: to nobody
+    is_bump: NDArray[np.bool_]  # it would touch what is solid
     least_m: Floats  # how near it comes to anything
 
 
@@ -69,6 +71,8 @@ class Rollouts:
     ) -> Floats:
         """The level velocity nearest to the wanted one [m/s] whose rollout is clear; if none is, the one farthest off.
 
+        Who cannot give way to people without touching what is solid does so as fast as it can past that.
+
         Args:
             wanted: north and east [m/s].
             last: that was asked for last, and is being answered.
@@ -82,11 +86,11 @@ class Rollouts:
             clearance = clearance.with_room_seen(here)
         here_m = float(clearance.at(here)[0])
         wants = self._judged(wanted[None], last, own, clearance, here_m, people)
-        if wants.is_clear[0] and wants.is_allowed[0] and wants.least_m[0] >= s.solid_m + _SLACK_M:
+        if wants.is_clear[0] and wants.too_fast[0] <= 0.0 and wants.least_m[0] >= s.solid_m + _SLACK_M:
             return wanted  # nothing costs less
         asked = _candidates(wanted, last, s.unseen_speed, is_too_near=here_m < s.solid_m)
         found = self._judged(asked, last, own, clearance, here_m, people)
-        is_clear, is_allowed, least_m = found.is_clear, found.is_allowed, found.least_m
+        is_clear, is_allowed, least_m = found.is_clear, found.too_fast <= 0.0, found.least_m
         speed, wanted_speed = np.hypot(*asked.T), float(np.hypot(*wanted))
         is_that_way = asked @ wanted > _THAT_WAY * speed * wanted_speed
         slower = wanted_speed - np.where(is_that_way, np.minimum(speed, wanted_speed), 0.0)
@@ -95,6 +99,10 @@ class Rollouts:
         cost += _GRAZING * np.maximum(s.solid_m + _SLACK_M - least_m, 0.0)
         if (is_clear & is_allowed).any():
             return np.asarray(asked[int(np.argmin(np.where(is_clear & is_allowed, cost, np.inf)))])
+        if is_allowed.any() and found.is_bump[is_allowed].all():
+            is_past = ~found.is_bump & ~_is_towards(asked, people)
+            if is_past.any():
+                return np.asarray(asked[int(np.argmin(np.where(is_past, found.too_fast, np.inf)))])
         if not is_allowed.any():  # between people
             return np.zeros(2)
         return np.asarray(asked[int(np.argmax(np.where(is_allowed, least_m - 1e-3 * speed, -np.inf)))])
@@ -106,15 +114,16 @@ class Rollouts:
         s, here = self._s, np.array(own.pos_ned[:2])
         near_m, is_seen = clearance.at(here + self._rolled(asked, np.array(own.vel_ned[:2]), last))
         may_be_unseen = np.hypot(asked[:, 0], asked[:, 1]) <= s.unseen_speed + 1e-6
-        is_allowed = np.ones(len(asked), bool)
+        too_fast = np.zeros(len(asked))
         for person in people:
-            is_allowed &= asked @ person.way <= person.closing_max + 1e-6
+            too_fast = np.maximum(too_fast, asked @ person.way - person.closing_max - 1e-6)
             if person.then_m < s.pressed_m:
                 may_be_unseen |= asked @ person.way < 0.0
+        is_bump = np.asarray((near_m < _room_m(here_m, s.solid_m - _BUMP_M)).any(1))
         is_blocked = (near_m < _room_m(here_m, s.solid_m)) | ~(is_seen | may_be_unseen[:, None])
         answered = 1 + round(s.reaction_s / _STEP_S)
         least_m = np.where(is_seen | may_be_unseen[:, None], near_m, 0.0)[:, answered:].min(1)
-        return _Judged(np.asarray(~is_blocked.any(1)), is_allowed, least_m)
+        return _Judged(np.asarray(~is_blocked.any(1)), too_fast, is_bump, least_m)
 
     def _rolled(self, asked: Floats, own: Floats, last: Floats) -> Floats:
         """Where each candidate leads from here [m], and so far ahead; shape (candidates, _STEPS + 1, 2)."""
@@ -122,6 +131,15 @@ class Rollouts:
         self._now[:] = own, last
         (self._launch_one if len(asked) == 1 else self._launch).launch()
         return np.asarray(self._way[: len(asked)], np.float64)
+
+
+def _is_towards(asked: Floats, people: Sequence[Somebody]) -> NDArray[np.bool_]:
+    """Which of some velocities lead nearer to somebody whom it has to give way to."""
+    is_towards = np.zeros(len(asked), bool)
+    for person in people:
+        if person.closing_max < 0.0:
+            is_towards |= asked @ person.way > 1e-6
+    return is_towards
 
 
 def _room_m(here_m: float, solid_m: float) -> float:

@@ -114,9 +114,9 @@ class GuardSettings(BaseModel):
     escape_climb: float = Field(default=ESCAPE_CLIMB_M_S, ge=0.0, le=20.0)
     """[m/s] upwards, nearer to somebody than it may be."""
     owner_brake: float = Field(default=OWNER_BRAKE_M_S2, ge=0.5, le=20.0)
-    """[m/s²] with which it is taken to brake before the owner; our flight controller's parameters may tell it ..."""
+    """[m/s²] with which it is taken to brake before the owner; our flight controller's parameters may tell both ..."""
     brake: float = Field(default=4.0, ge=0.5, le=20.0)
-    """... and before what does not move."""
+    """... and with which it changes its velocity before what does not move."""
     reaction_s: float = Field(default=REACTION_S, ge=0.0, le=1.0)
     """From a setpoint to the motion, besides the age of the picture; measured."""
     hears_s: float = Field(default=0.15, ge=0.0, le=1.0)

@@ -22,12 +22,12 @@ CELLS = 96  # of a side: 12 m to each
 ROOM_M = 1.0  # more room about a place is not told
 REACH_M = 10.0  # farther nothing is asked for
 _ABOVE_M, _BELOW_M = 0.7, 0.4  # of the slice that the vehicle flies through; guess: its own height twice
+_LEVEL_M = 0.5  # from higher or lower than this another slice was seen: who climbs has yet to look for crowns
 _NO_RETURN_M = 4.0  # so far a column without any return is taken to be free, if others have some; guess
-_HOLD_US = 6_000_000  # for so long what was seen to be free counts, and what was overhead,
-_SOLID_US = 15_000_000  # and so long what was solid: trees stay, while who drifts towards one does not look there
+_HOLD_US = 6_000_000  # for so long what was seen to be free counts,
+_SOLID_US = 15_000_000  # and so long what was solid, or overhead: trees stay, while who drifts towards one looks away
 _OWNER_M = 0.6  # round the owner, who is no part of the map; they pass trees at 0.6 m from their middle
 _LEAD_S = 1.0  # nobody runs into what they reach in so long; guess
-_TOP_M = 0.3  # what is farther up than this is over the vehicle
 _NONE = 255  # of the depth channel: no return
 _DEPTH_M = depth_of(np.minimum(np.arange(_NONE + 1.0), _NONE - 1.0))  # of each level of it
 _ALIVE = 0.05  # fraction of pixels with depth below which there is none
@@ -91,6 +91,8 @@ class LocalMap:
 
     def __init__(self) -> None:
         self._free_us = np.full((CELLS, CELLS), _UNSEEN, np.int64)
+        self._free_down = np.zeros((CELLS, CELLS))  # [m] of the vehicle that saw so
+        self._down = 0.0  # [m] of the vehicle by what it was told last
         self._solid_us = np.full((CELLS, CELLS), _UNSEEN, np.int64)
         self._over = np.full((CELLS, CELLS), -np.inf)  # [m] down, of the lowest that was seen over it
         self._over_us = np.full((CELLS, CELLS), _UNSEEN, np.int64)
@@ -140,7 +142,7 @@ class LocalMap:
         level_m = np.hypot(points[..., 0], points[..., 1])
         is_there = is_return & (points[..., 2] > -_ABOVE_M) & (points[..., 2] < _BELOW_M)
         self._carve(here, rays_ned, np.where(is_there, level_m, np.inf), now_us)
-        is_over = is_return & ~is_person & (points[..., 2] < -_TOP_M) & (level_m < REACH_M)
+        is_over = is_return & ~is_person & (points[..., 2] <= -_ABOVE_M) & (level_m < REACH_M)
         self._look_up(points[is_over] + pose.pos_ned, now_us)
         is_solid = is_there & ~is_person & (level_m < REACH_M)
         if owner is not None:
@@ -155,12 +157,12 @@ class LocalMap:
     def _look_up(self, points: Floats, now_us: int) -> None:
         """Notes what lies overhead, ned."""
         rows, columns = cells_of(points[:, :2])
-        old = self._over_us[rows, columns] <= now_us - _HOLD_US
+        old = self._over_us[rows, columns] <= now_us - _SOLID_US
         self._over[rows[old], columns[old]] = -np.inf
         np.maximum.at(self._over, (rows, columns), points[:, 2])
         self._over_us[rows, columns] = now_us
 
-    def room_up_m(self, pos_ned: Vector, now_us: int, hold_us: int = _HOLD_US) -> float:
+    def room_up_m(self, pos_ned: Vector, now_us: int, hold_us: int = _SOLID_US) -> float:
         """How far up it is [m] to the lowest of what was seen over where the vehicle is; inf: to nothing.
 
         Args:
@@ -197,7 +199,7 @@ class LocalMap:
         along = np.arange(0.0, _LEAD_S + 0.04, 0.04)[:, None, None] * velocity[:2]
         rows, columns = cells_of((place[:2] + along + self._person).reshape(-1, 2))
         is_open = self._solid_us[rows, columns] <= now_us - _SOLID_US
-        self._free_us[rows[is_open], columns[is_open]] = now_us
+        self._note_free(rows[is_open], columns[is_open], now_us)
 
     def sweep(
         self, bearings_rad: Floats, width_rad: float, ranges_m: Floats, limit_m: float, pose: Pose, now_us: int
@@ -231,10 +233,14 @@ class LocalMap:
         ways = (units[:, None] * steps[None, :, None])[steps[None] < free_m[:, None]]
         for seen in (ways, self._hull):
             rows, columns = cells_of((heres[:, None] + seen).reshape(-1, 2))
-            self._free_us[rows, columns] = now_us
+            self._note_free(rows, columns, now_us)
         rows, columns = cells_of((heres[:, None] + self._own).reshape(-1, 2))
         is_solid = self._solid_us[rows, columns] > now_us - _SOLID_US
-        self._free_us[rows[~is_solid], columns[~is_solid]] = now_us
+        self._note_free(rows[~is_solid], columns[~is_solid], now_us)
+
+    def _note_free(self, rows: NDArray[np.int64], columns: NDArray[np.int64], now_us: int) -> None:
+        self._free_us[rows, columns] = now_us
+        self._free_down[rows, columns] = self._down
 
     def sight(self, pose: Pose, there_ned: Floats, now_us: int) -> None:
         """Notes as free what lies between the vehicle at a pose and what it saw at a place, wide enough for a hull."""
@@ -252,10 +258,12 @@ class LocalMap:
         self._follow(pos_ned)
         then = now_us - _HOLD_US
         is_open = (self._solid_us <= now_us - _SOLID_US) | (self._solid_us < self._free_us)
+        is_open &= (self._over_us <= now_us - _SOLID_US) | (self._over <= self._down - _ABOVE_M)
         first = [-(line % CELLS) for line in self._corner]  # to where its sides do not meet
         unrolled = np.roll(is_open, first, (0, 1)).astype(np.uint8)
         near_m = CELL_M * cv2.distanceTransform(unrolled, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        is_seen = np.roll(self._free_us > then, first, (0, 1))
+        is_level = np.abs(self._free_down - self._down) < _LEVEL_M
+        is_seen = np.roll((self._free_us > then) & is_level, first, (0, 1))
         return Clearance(np.minimum(near_m, ROOM_M), is_seen, self._corner)
 
     def nearest_m(self, pos_ned: Vector, yaw_rad: float, now_us: int) -> Floats:
@@ -277,7 +285,8 @@ class LocalMap:
         return out
 
     def _follow(self, pos_ned: Vector) -> None:
-        """Forgets what has come to lie outside."""
+        """Forgets what has come to lie outside, of who is there."""
+        self._down = float(pos_ned[2])
         corner = tuple(int(np.floor(x / CELL_M)) - CELLS // 2 for x in pos_ned[:2])
         for axis in (0, 1):
             moved = corner[axis] - self._corner[axis]

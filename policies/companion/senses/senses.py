@@ -28,6 +28,7 @@ from policies.tasks.follow_me.observe import REPORT_LAG_S
 
 Floats = NDArray[np.float64]
 PHONE_OLD_S = 3.0
+_CHEST_M = 1.0  # above the ground
 _GATE_M = 1.0  # from where the owner is expected by sights; who is farther off is somebody else,
 _GATE_M_S = 2.5  # and wider by so much with each second without a sight,
 _GATE_MAX_M = 8.0
@@ -177,7 +178,10 @@ class Senses:
         return self._hears and self.heard_us is not None and self._boot_us - self.heard_us < PHONE_OLD_S * 1e6
 
     def owner_now(self, own: Own) -> PersonNow | None:
-        """Where the owner is: by sights, or if those are old by the phone too; None: nobody knows."""
+        """Where the owner is: by sights, or if those are old by the phone too; None: nobody knows.
+
+        Who is not seen stands on the ground below the vehicle: a phone's height is metres off.
+        """
         silence_s = self.silence_s(own)
         if silence_s < _GONE_S:
             return self.seen.person_now(own.boot_us)
@@ -185,6 +189,8 @@ class Senses:
         if track is None or not track.is_known:
             return None
         place = track.pos_ned + max(own.boot_us - track.time_us, 0) * 1e-6 * track.vel_ned
+        if isfinite(own.carried_height_m):
+            place[2] = own.pos_ned[2] + own.carried_height_m - _CHEST_M
         return PersonNow(place, track.pos_cov[:2, :2], track.vel_ned[:2], track.vel_cov[:2, :2], silence_s)
 
     def others_now(self, own: Own) -> list[PersonNow]:

@@ -90,6 +90,7 @@ def test_in_airframes_that_were_not_measured_it_is_trained_under_the_guard_that_
 def test_the_guard_of_a_flight_knows_its_vehicle_as_training_does():
     flight, guard = quick()
     assert guard.settings.owner_brake == QUICK_BRAKE_M_S2
+    assert guard.settings.brake == pytest.approx(QUICK["MPC_ACC_HOR"])
     flight.params.set("MPC_ACC_HOR", 2.0)  # as by a ground station
     assert guard.settings.owner_brake == pytest.approx(0.5 * USUAL)
     guard.reckon_with(0.1)
@@ -102,3 +103,4 @@ def test_a_guard_that_was_told_is_not_told_again():
     assert guard.settings.owner_brake == 2.0
     flight.params.set("MPC_ACC_HOR", 5.0)
     assert guard.settings.owner_brake == 2.0
+    assert guard.settings.brake == pytest.approx(5.0)

@@ -1,5 +1,8 @@
 """The detectors that ship, as they fly and drive, on worlds that no training has: figures of the documentation hold."""
 
+from itertools import combinations
+from math import dist
+
 import numpy as np
 import pytest
 
@@ -85,3 +88,11 @@ class Says:
 
     def find(self, *_):
         return self._found
+
+
+def test_somebody_near_is_one(there):
+    """Whose chest is wider than the cells that tell two people apart."""
+    detector = PersonDetector()
+    for image in there.images[there.has_person][:200]:
+        places = [one.chest_hfrd[:2] for one in detector.find(image, (0.0, 0.0))]
+        assert all(dist(a, b) > 0.4 for a, b in combinations(places, 2))

@@ -79,6 +79,19 @@ def test_who_is_pressed_goes_back_to_where_it_has_not_looked() -> None:
     assert kept == pytest.approx(back)
 
 
+@pytest.mark.parametrize("aside_m", [-0.3, 0.0, 0.3])
+def test_who_has_to_give_way_gives_way_past_a_trunk_and_not_into_it(aside_m: float) -> None:
+    """It would come to a stand there anyway, and then be nearer than on the way past."""
+    back, still = np.array([-3.0, 0.0]), np.zeros(2)
+    pressing = [Somebody(np.array([1.0, 0.0]), -3.0, 1.0, 0.0)]
+    trunk = (-1.6, aside_m)
+    around_it, own = around(trunk, still), own_at(still, still)
+    kept = Rollouts(S, asks_beside=True).clear_velocity(back, still, own, around_it, pressing)
+    assert float(kept[0]) < -0.5
+    passes_m = abs(trunk[0] * float(kept[1]) - trunk[1] * float(kept[0])) / float(np.hypot(*kept))
+    assert passes_m > 0.6
+
+
 def test_who_can_go_round_a_trunk_does_so_at_speed() -> None:
     """Slower and slower towards it, it would be left behind by whom it follows."""
     wanted, pos = np.array([4.0, 0.0]), np.zeros(2)

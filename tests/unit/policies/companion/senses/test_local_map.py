@@ -166,6 +166,24 @@ def test_what_hangs_over_a_place_is_remembered_for_whoever_asks_for_longer() -> 
     assert seen.room_up_m(HERE, 60_000_000, 600_000_000) == float("inf")
 
 
+def test_what_was_free_lower_down_is_not_known_to_be_for_who_has_climbed() -> None:
+    seen = LocalMap()
+    seen.see(picture(5.0), POSE, None, 0)
+    ahead = (HERE[0] + 2.0, *HERE[1:])
+    for climbed_m, is_free in ((0.3, True), (1.0, False)):
+        known = seen.clearance((*HERE[:2], HERE[2] - climbed_m), 0)
+        assert bool(known.at(np.array(ahead[:2]))[1]) == is_free
+
+
+def test_who_climbs_to_what_was_seen_overhead_has_it_in_the_way() -> None:
+    seen, crown = LocalMap(), picture(None)
+    crown[: IMAGE_SIZE // 4] = picture(3.0)[0, 0]
+    seen.see(crown, POSE, None, 0)
+    for climbed_m, is_solid in ((0.0, False), (2.5, True)):
+        there = (*HERE[:2], HERE[2] - climbed_m)
+        assert (way_m(seen, there, NORTH, 10_000_000)[1] < 4.0) == is_solid
+
+
 def test_how_near_something_is_changes_by_no_more_than_one_moves() -> None:
     """Not by steps of a cell: a way of half a cell would be as near as it or not at all."""
     seen = LocalMap()

@@ -193,6 +193,19 @@ def test_the_phone_finds_the_owner_again_where_others_were() -> None:
     assert scene.senses.seen.now(scene.own.boot_us)[0][:2] == pytest.approx([3.0, 0.0], abs=0.3)
 
 
+@pytest.mark.parametrize("phone_down", [-6.0, 4.0])
+def test_an_owner_out_of_sight_stands_on_the_ground_whatever_height_their_phone_says(
+    scene: Scene, phone_down: float
+) -> None:
+    for _ in range(10):
+        scene.report(3.0, 0.0)
+        scene.phone.pos_ned = (3.0, 0.0, phone_down)
+        scene.look()
+    owner = scene.senses.owner_now(scene.own)
+    assert owner is not None
+    assert owner.pos_ned[2] == pytest.approx(-1.0)
+
+
 def test_the_ground_seen_on_take_off_is_nothing_solid(scene: Scene) -> None:
     scene.own.range_m, scene.own.pos_ned = 0.3, (0.0, 0.0, -0.3)
     scene.look(byte=80)
