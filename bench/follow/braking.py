@@ -2,7 +2,7 @@
 
 A pilot that asks for a speed and then for none, back and forth, over MAVLink in open country and wind, the flight
 controller set as it is to follow, or with `--usual` as it is else. The way counts from the decision that asks for none.
-The rule has to allow for a decision more: who stops may do so right after one.
+The rule has to allow for a decision more: who stops may do so right after one. Who overshoots comes back.
 """
 
 from collections.abc import Mapping
@@ -70,21 +70,22 @@ def config_of(airframe: str, wind_m_s: float, parameters: Mapping[str, float]) -
     )
 
 
-def stopping_m(config: FlightConfig, speed: float) -> Floats:
-    """The way [m] to each stand but the first, while it comes to speed: (stands,)."""
+def stops(config: FlightConfig, speed: float) -> tuple[Floats, Floats]:
+    """The way [m] to each stand but the first, while it comes to speed, and how fast it goes back [m/s]: (stands,)."""
     pilot = Stopper(speed)
     flight, companion = flight_with_companion(config, pilot, guard=GuardSettings(is_on=False))
     truth = flight.rig.rows["truth"][0]
-    rows: list[tuple[int, float, float, float]] = []
+    rows: list[tuple[int, float, float, float, float]] = []
 
     def look(_: FollowWatch) -> None:
         north, east = (float(x) for x in truth["pos_ned"][:2])
-        rows.append((pilot.decisions, north, east, float(np.hypot(*truth["vel_ned"][:2]))))
+        rows.append((pilot.decisions, north, east, *(float(x) for x in truth["vel_ned"][:2])))
 
     follow_for(flight, companion, (_TURNS + 1) * (LEG + STAND) * DECISION_S, look)
     seen = np.array(rows)
-    asked, place, speeds = seen[:, 0] - 1, seen[:, 1:3], seen[:, 3]
-    ways = []
+    asked, place, vel = seen[:, 0] - 1, seen[:, 1:3], seen[:, 3:]
+    speeds = np.hypot(*vel.T)
+    ways, backs = [], []
     for turn in range(1, _TURNS):
         is_asked = (asked >= turn * (LEG + STAND) + LEG) & (asked < (turn + 1) * (LEG + STAND))
         first = int(np.argmax(is_asked))
@@ -93,7 +94,8 @@ def stopping_m(config: FlightConfig, speed: float) -> Floats:
         require(bool(is_standing.any()), f"{config.airframe}: never stood after {speed:g} m/s")
         stands = int(np.argmax(is_standing))
         ways.append(float(np.hypot(*(place[stands] - place[first]))))
-    return np.array(ways, np.float32)
+        backs.append(-float((vel[is_asked] @ vel[first]).min()) / float(speeds[first]))
+    return np.array(ways, np.float32), np.array(backs, np.float32)
 
 
 def rule_m(config: FlightConfig, speed: float) -> float:
@@ -109,13 +111,16 @@ def main(
     ] = False,
 ) -> None:
     """Prints the table."""
-    table = Table("airframe", "wind [m/s]", "speed [m/s]", "to a stand [m]", "and a decision more", "the rule")
+    table = Table(
+        "airframe", "wind [m/s]", "speed [m/s]", "to a stand [m]", "and a decision more", "the rule", "back at [m/s]"
+    )
     cases = list(product(airframes or MEASURED, WINDS_M_S, (2.0, 4.0, 6.0)))
     for airframe, wind_m_s, speed in track(cases, "braking", transient=True):
         config = config_of(airframe, wind_m_s, {} if usual else QUICK)
-        way_m = float(stopping_m(config, speed).max())
+        ways_m, backs = stops(config, speed)
+        way_m = float(ways_m.max())
         more_m = way_m + speed * float(DECISION_S)
-        figures = (wind_m_s, speed, way_m, more_m, rule_m(config, speed))
+        figures = (wind_m_s, speed, way_m, more_m, rule_m(config, speed), float(backs.max()))
         table.add_row(airframe, *(f"{figure:.3g}" for figure in figures))
     Console().print(table)
 

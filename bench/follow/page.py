@@ -39,7 +39,8 @@ they have learned, its critic alone seeing the truth. Each stage is one process 
 times with another beside it; glibc keeps their memory and OpenMP's threads wait passively (`bench/side_by_side.py`).
 Wall clock is that of training; compiling the kernels, once per machine, is not in it. Judged are most probable actions
 in held-out worlds: fresh hills, trees, owners, wind and noise, {episodes}.
-Trackers fly a vehicle of 6 m/s² since 8d34b193, where all others have one of 4; the rows of them here are of before.
+Trackers fly a quicker vehicle than all others since 8d34b193; their rows here are of before, and all flown ones of
+before [the controller's feedback was mended](../decisions/0024-as-late-as-it-can-be.md).
 In batch the trackers, and they alone, meet what they are trained in: late and lost pictures, missing depth, rough
 sensors, others about, under the guard's rule of people; in flight they meet what all do.
 "Flown" are flights over MAVLink in lockstep: the whole autopilot, a companion computer, one vehicle at a time,

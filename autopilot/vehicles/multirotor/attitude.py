@@ -67,13 +67,25 @@ def turned(q_ned_from_frd: wp.quat, omega_ned: wp.vec3, dt_s: float) -> wp.quat:
 
 
 @wp.func
+def rate_lags_s(params: ControlParams) -> wp.vec3:
+    """How late body rates follow their setpoints [s], frd: of the rate loops' gains, whatever the motors' lag."""
+    tilt = (1.0 + params.rate_d_tilt) / wp.max(params.rate_p_tilt, 1.0)
+    return wp.vec3(tilt, tilt, (1.0 + params.rate_d_yaw) / wp.max(params.rate_p_yaw, 0.5))
+
+
+@wp.func
 def rate_setpoint(
     params: ControlParams, q_ned_from_frd: wp.quat, q_sp_ned_from_frd: wp.quat, omega_feed_ned: wp.vec3
 ) -> wp.vec3:
-    """Body rates [rad/s], frd, that close the attitude error, plus the rate at which the setpoint itself turns."""
+    """Body rates [rad/s], frd, that close the attitude error, plus the rate at which the setpoint itself turns.
+
+    The error is that to where a setpoint that turns so was as long ago as rates lag: the rate loop cannot be earlier,
+    and what it made up for it would have to make up for again, the other way round, when the setpoint stops.
+    """
     gain = wp.vec3(params.att_p_roll, params.att_p_pitch, params.att_p_yaw)
-    rate = wp.cw_mul(gain, attitude_error(q_ned_from_frd, q_sp_ned_from_frd))
-    rate = rate + wp.quat_rotate_inv(q_ned_from_frd, omega_feed_ned)
+    feed = wp.quat_rotate_inv(q_ned_from_frd, omega_feed_ned)
+    error = attitude_error(q_ned_from_frd, q_sp_ned_from_frd) - wp.cw_mul(rate_lags_s(params), feed)
+    rate = wp.cw_mul(gain, error) + feed
     return clamp3(rate, wp.vec3(params.rate_max_roll, params.rate_max_pitch, params.rate_max_yaw))
 
 

@@ -4,6 +4,7 @@ import warp as wp
 
 from autopilot.control.pid import clamp_horizontal
 from autopilot.ports import Estimate
+from autopilot.vehicles.multirotor.attitude import rate_lags_s
 from autopilot.vehicles.multirotor.params import ControlParams
 from autopilot.vehicles.multirotor.trajectory import TrajectoryState, flown_velocity, follows_position, within_speeds
 
@@ -17,13 +18,17 @@ _CORRECTION_Z_M_S = wp.constant(2.0)  # guess
 def velocity_setpoint(params: ControlParams, trajectory: TrajectoryState, est: Estimate) -> wp.vec3:
     """Velocity [m/s], ned: the trajectory's plus the correction of its position error where position is controlled.
 
-    A trajectory out of reach stands still, so that what remains points towards it.
+    A trajectory out of reach stands still, so that what remains points towards it. Level, the position is compared with
+    where the vehicle can be by now, as late as its velocity.
     """
+    vel_ned = flown_velocity(trajectory)
+    lag_s = rate_lags_s(params)
+    lags_ned = wp.vec3(lag_s[0] * vel_ned[0], lag_s[1] * vel_ned[1], 0.0)
     gain = wp.vec3(params.pos_p_xy, params.pos_p_xy, params.pos_p_z)
     correction = wp.vec3(0.0, 0.0, 0.0)
     for k in range(3):
         if follows_position(trajectory, k):
-            correction[k] = gain[k] * (trajectory.pos_ned[k] - est.pos_ned[k])
+            correction[k] = gain[k] * (trajectory.pos_ned[k] - lags_ned[k] - est.pos_ned[k])
     correction = clamp_horizontal(correction, _CORRECTION_XY_M_S)
     correction[2] = wp.clamp(correction[2], -_CORRECTION_Z_M_S, _CORRECTION_Z_M_S)
-    return within_speeds(params, flown_velocity(trajectory) + correction)
+    return within_speeds(params, vel_ned + correction)

@@ -10,6 +10,7 @@ import warp as wp
 
 from autopilot.control.pid import clamp_horizontal, low_pass_fraction
 from autopilot.ports import Estimate
+from autopilot.vehicles.multirotor.attitude import rate_lags_s
 from autopilot.vehicles.multirotor.control_airframe import ControlAirframe
 from autopilot.vehicles.multirotor.params import ControlParams
 from autopilot.vehicles.multirotor.trajectory import FOLLOW_ACCEL, TrajectoryState, flown_acceleration
@@ -95,15 +96,19 @@ def velocity_step(
     is_ramping: bool,
     dt_s: float,
 ) -> VelocityState:
-    """The state with a new thrust setpoint; the integral stops where the limits take something away."""
-    error = vel_sp_ned - est.vel_ned
+    """The state with a new thrust setpoint; the integral stops where the limits take something away.
+
+    Level velocity is compared with what it can be by now: the lean, and so its acceleration, follows as late as rates.
+    """
+    feed = flown_acceleration(trajectory)
+    lag_s = rate_lags_s(params)
+    error = vel_sp_ned - wp.vec3(lag_s[0] * feed[0], lag_s[1] * feed[1], 0.0) - est.vel_ned
     for k in range(3):
         if trajectory.mode[k] == FOLLOW_ACCEL:
             error[k] = 0.0
     gain_p = wp.vec3(params.vel_p_xy, params.vel_p_xy, params.vel_p_z)
     gain_i = wp.vec3(params.vel_i_xy, params.vel_i_xy, params.vel_i_z)
     gain_d = wp.vec3(params.vel_d_xy, params.vel_d_xy, params.vel_d_z)
-    feed = flown_acceleration(trajectory)
     feed = feed + wp.cw_mul(gain_d, feed - state.accel_ned)
     accel_sp = feed + wp.cw_mul(gain_p, error) + state.integral_ned - state.disturbance_ned
     wanted = accel_sp - wp.vec3(0.0, 0.0, _GRAVITY)

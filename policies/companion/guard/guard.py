@@ -44,7 +44,6 @@ SHORT_OF_M = 2.0  # and no nearer to there than this; guess
 _STAYS_M_S = 0.5  # as fast it goes back to where it stays
 _RISEN_US = 2_000_000  # for so long it stays over the owner
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
-_USUAL = GuardSettings()
 _KEPT_M_S = 1.5  # so much of what things take off a velocity the next decision may go on from
 
 
@@ -103,10 +102,9 @@ class Guard:
             self._make_rules()
 
     def reckon_with_brake(self, brake: float) -> None:
-        """The vehicle brakes so hard before people [m/s²], and in that measure before the rest; what was set stays."""
-        brakes = {"owner_brake": brake, "brake": brake * _USUAL.brake / _USUAL.owner_brake}
-        known = {name: value for name, value in brakes.items() if name not in self._set}
-        self._usual = self._usual.model_copy(update=known)
+        """The vehicle brakes so hard [m/s²], before people and before what does not move; what was set stays."""
+        known = {"owner_brake", "brake"} - self._set
+        self._usual = self._usual.model_copy(update=dict.fromkeys(known, brake))
         self._make_rules()
 
     def _make_rules(self) -> None:

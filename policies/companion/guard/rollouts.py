@@ -42,7 +42,6 @@ class _Judged:
 
     is_clear: NDArray[np.bool_]  # of what is solid, and where nobody has looked
     too_fast: Floats  # [m/s] by how much it comes nearer to somebody than the rule of people lets it; 0: to nobody
-    is_bump: NDArray[np.bool_]  # it would touch what is solid
     least_m: Floats  # how near it comes to anything
 
 
@@ -65,6 +64,7 @@ class Rollouts:
         inputs = [asked, now, hears_s, s.reaction_s - hears_s, s.brake, s.solid_m, _STEP_S, way]
         self._launch: Any = wp.launch(roll, _MOST, inputs, record_cmd=True)
         self._launch_one: Any = wp.launch(roll, 1, inputs, record_cmd=True)
+        self._launch_bare: Any = wp.launch(roll, _MOST, [*inputs[:5], 0.0, *inputs[6:]], record_cmd=True)
 
     def clear_velocity(
         self, wanted: Floats, last: Floats, own: Own, around: LocalMap, people: Sequence[Somebody] = ()
@@ -99,12 +99,13 @@ class Rollouts:
         cost += _GRAZING * np.maximum(s.solid_m + _SLACK_M - least_m, 0.0)
         if (is_clear & is_allowed).any():
             return np.asarray(asked[int(np.argmin(np.where(is_clear & is_allowed, cost, np.inf)))])
-        if is_allowed.any() and found.is_bump[is_allowed].all():
-            is_past = ~found.is_bump & ~_is_towards(asked, people)
-            if is_past.any():
-                return np.asarray(asked[int(np.argmin(np.where(is_past, found.too_fast, np.inf)))])
         if not is_allowed.any():  # between people
             return np.zeros(2)
+        bumps = self._bumps(asked, last, own, clearance, here_m)
+        is_past = ~bumps & ~_is_towards(asked, people)
+        if bumps[is_allowed].all() and is_past.any():
+            least = np.argmin(np.where(is_past, found.too_fast + 1e-3 * cost, np.inf))
+            return np.asarray(asked[int(least)])
         return np.asarray(asked[int(np.argmax(np.where(is_allowed, least_m - 1e-3 * speed, -np.inf)))])
 
     def _judged(
@@ -119,26 +120,31 @@ class Rollouts:
             too_fast = np.maximum(too_fast, asked @ person.way - person.closing_max - 1e-6)
             if person.then_m < s.pressed_m:
                 may_be_unseen |= asked @ person.way < 0.0
-        is_bump = np.asarray((near_m < _room_m(here_m, s.solid_m - _BUMP_M)).any(1))
         is_blocked = (near_m < _room_m(here_m, s.solid_m)) | ~(is_seen | may_be_unseen[:, None])
         answered = 1 + round(s.reaction_s / _STEP_S)
         least_m = np.where(is_seen | may_be_unseen[:, None], near_m, 0.0)[:, answered:].min(1)
-        return _Judged(np.asarray(~is_blocked.any(1)), too_fast, is_bump, least_m)
+        return _Judged(np.asarray(~is_blocked.any(1)), too_fast, least_m)
 
-    def _rolled(self, asked: Floats, own: Floats, last: Floats) -> Floats:
+    def _bumps(self, asked: Floats, last: Floats, own: Own, clearance: Clearance, here_m: float) -> NDArray[np.bool_]:
+        """Which of some candidates would touch what is solid before the vehicle stands."""
+        way = self._rolled(asked, np.array(own.vel_ned[:2]), last, looks_ahead=False)
+        near_m, _ = clearance.at(np.array(own.pos_ned[:2]) + way)
+        return np.asarray((near_m < _room_m(here_m, self._s.solid_m - _BUMP_M)).any(1))
+
+    def _rolled(self, asked: Floats, own: Floats, last: Floats, *, looks_ahead: bool = True) -> Floats:
         """Where each candidate leads from here [m], and so far ahead; shape (candidates, _STEPS + 1, 2)."""
         self._asked[: len(asked)] = asked
         self._now[:] = own, last
-        (self._launch_one if len(asked) == 1 else self._launch).launch()
+        ahead = self._launch_one if len(asked) == 1 else self._launch
+        (ahead if looks_ahead else self._launch_bare).launch()
         return np.asarray(self._way[: len(asked)], np.float64)
 
 
 def _is_towards(asked: Floats, people: Sequence[Somebody]) -> NDArray[np.bool_]:
-    """Which of some velocities lead nearer to somebody whom it has to give way to."""
+    """Which of some velocities lead nearer to somebody, and faster than they may."""
     is_towards = np.zeros(len(asked), bool)
     for person in people:
-        if person.closing_max < 0.0:
-            is_towards |= asked @ person.way > 1e-6
+        is_towards |= asked @ person.way > max(person.closing_max, 0.0) + 1e-6
     return is_towards
 
 

@@ -24,10 +24,11 @@ REACH_M = 10.0  # farther nothing is asked for
 _ABOVE_M, _BELOW_M = 0.7, 0.4  # of the slice that the vehicle flies through; guess: its own height twice
 _LEVEL_M = 0.5  # from higher or lower than this another slice was seen: who climbs has yet to look for crowns
 _NO_RETURN_M = 4.0  # so far a column without any return is taken to be free, if others have some; guess
-_HOLD_US = 6_000_000  # for so long what was seen to be free counts,
-_SOLID_US = 15_000_000  # and so long what was solid, or overhead: trees stay, while who drifts towards one looks away
+_HOLD_US = 6_000_000  # for so long what was seen to be free counts, and what was overhead,
+_SOLID_US = 15_000_000  # and so long what was solid: trees stay, while who drifts towards one does not look there
 _OWNER_M = 0.6  # round the owner, who is no part of the map; they pass trees at 0.6 m from their middle
 _LEAD_S = 1.0  # nobody runs into what they reach in so long; guess
+_TOP_M = 0.3  # what is farther up than this is over the vehicle
 _NONE = 255  # of the depth channel: no return
 _DEPTH_M = depth_of(np.minimum(np.arange(_NONE + 1.0), _NONE - 1.0))  # of each level of it
 _ALIVE = 0.05  # fraction of pixels with depth below which there is none
@@ -142,7 +143,7 @@ class LocalMap:
         level_m = np.hypot(points[..., 0], points[..., 1])
         is_there = is_return & (points[..., 2] > -_ABOVE_M) & (points[..., 2] < _BELOW_M)
         self._carve(here, rays_ned, np.where(is_there, level_m, np.inf), now_us)
-        is_over = is_return & ~is_person & (points[..., 2] <= -_ABOVE_M) & (level_m < REACH_M)
+        is_over = is_return & ~is_person & (points[..., 2] < -_TOP_M) & (level_m < REACH_M)
         self._look_up(points[is_over] + pose.pos_ned, now_us)
         is_solid = is_there & ~is_person & (level_m < REACH_M)
         if owner is not None:
@@ -157,12 +158,12 @@ class LocalMap:
     def _look_up(self, points: Floats, now_us: int) -> None:
         """Notes what lies overhead, ned."""
         rows, columns = cells_of(points[:, :2])
-        old = self._over_us[rows, columns] <= now_us - _SOLID_US
+        old = self._over_us[rows, columns] <= now_us - _HOLD_US
         self._over[rows[old], columns[old]] = -np.inf
         np.maximum.at(self._over, (rows, columns), points[:, 2])
         self._over_us[rows, columns] = now_us
 
-    def room_up_m(self, pos_ned: Vector, now_us: int, hold_us: int = _SOLID_US) -> float:
+    def room_up_m(self, pos_ned: Vector, now_us: int, hold_us: int = _HOLD_US) -> float:
         """How far up it is [m] to the lowest of what was seen over where the vehicle is; inf: to nothing.
 
         Args:
@@ -258,7 +259,6 @@ class LocalMap:
         self._follow(pos_ned)
         then = now_us - _HOLD_US
         is_open = (self._solid_us <= now_us - _SOLID_US) | (self._solid_us < self._free_us)
-        is_open &= (self._over_us <= now_us - _SOLID_US) | (self._over <= self._down - _ABOVE_M)
         first = [-(line % CELLS) for line in self._corner]  # to where its sides do not meet
         unrolled = np.roll(is_open, first, (0, 1)).astype(np.uint8)
         near_m = CELL_M * cv2.distanceTransform(unrolled, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)

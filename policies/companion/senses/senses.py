@@ -28,7 +28,8 @@ from policies.tasks.follow_me.observe import REPORT_LAG_S
 
 Floats = NDArray[np.float64]
 PHONE_OLD_S = 3.0
-_CHEST_M = 1.0  # above the ground
+_CHEST_M = 1.0  # above the ground,
+_GROUND_US = 2_000_000  # which is where the range finder saw the lowest of so long; guess
 _GATE_M = 1.0  # from where the owner is expected by sights; who is farther off is somebody else,
 _GATE_M_S = 2.5  # and wider by so much with each second without a sight,
 _GATE_MAX_M = 8.0
@@ -70,6 +71,7 @@ class Senses:
         self.poses = PoseHistory()
         """Where the vehicle was in the last seconds."""
         self.map = LocalMap()
+        self._grounds: list[tuple[int, float]] = []  # when and how far down [m] the range finder saw something
         self._is_up = True  # until a range says otherwise
         self._is_by_colours = False  # the newest image had no depth: who stands in it is on no map
         self.seen = SeenOwner()
@@ -92,6 +94,9 @@ class Senses:
             self._forget()
         self._boot_us = own.boot_us
         self.poses.note(own)
+        self._grounds = [known for known in self._grounds if own.boot_us - known[0] < _GROUND_US]
+        if isfinite(down := own.pos_ned[2] + own.height_m):
+            self._grounds.append((own.boot_us, down))
         if owner.count != self._reports:
             self._reports, self.heard_us = owner.count, own.boot_us
             self._check(own, owner)
@@ -180,7 +185,8 @@ class Senses:
     def owner_now(self, own: Own) -> PersonNow | None:
         """Where the owner is: by sights, or if those are old by the phone too; None: nobody knows.
 
-        Who is not seen stands on the ground below the vehicle: a phone's height is metres off.
+        Who is not seen stands on the ground below the vehicle, where a range finder shows that: a phone's height is
+        metres off. It may show a head, and so the lowest of the last seconds counts.
         """
         silence_s = self.silence_s(own)
         if silence_s < _GONE_S:
@@ -189,8 +195,8 @@ class Senses:
         if track is None or not track.is_known:
             return None
         place = track.pos_ned + max(own.boot_us - track.time_us, 0) * 1e-6 * track.vel_ned
-        if isfinite(own.carried_height_m):
-            place[2] = own.pos_ned[2] + own.carried_height_m - _CHEST_M
+        if self._grounds:
+            place[2] = max(down for _, down in self._grounds) - _CHEST_M
         return PersonNow(place, track.pos_cov[:2, :2], track.vel_ned[:2], track.vel_cov[:2, :2], silence_s)
 
     def others_now(self, own: Own) -> list[PersonNow]:

@@ -26,7 +26,7 @@ class FollowSettings(RigSettings):
     """`as-documented` (the text), `improved` (ours) or `vision-only` (ours, without any word of where the owner is)."""
     observation: Observation = "camera"
     """`camera`: what a policy can know in flight; `tracked`: the same, but of detector, filter and map instead of an
-    image, which are drawn from a model of them, and a quicker vehicle, of 6 m/s²; `state`: the truth, for
+    image, which are drawn from a model of them, and a quicker vehicle, of 7 m/s²; `state`: the truth, for
     teachers."""
     owner: OwnerClass = "walks"
     """The owner's fastest: `walks` up to 2 m/s, `runs` up to 5 m/s, or `any` between 1 and 6 m/s, drawn per episode,

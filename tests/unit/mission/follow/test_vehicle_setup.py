@@ -35,12 +35,12 @@ def test_a_vehicle_as_it_ships_brakes_as_a_guard_takes_any_vehicle_to():
 
 
 def test_a_quicker_vehicle_is_taken_to_brake_harder_and_a_slower_one_more_gently():
-    assert brake_of("x500", **QUICK) == pytest.approx(1.5 * USUAL)
+    assert 1.6 * USUAL < brake_of("x500", **QUICK) < 1.75 * USUAL  # the wind takes some of its lean
     assert brake_of("x500", MPC_ACC_HOR=2.0) == pytest.approx(0.5 * USUAL)
 
 
 def test_what_it_takes_long_to_come_to_does_not_count():
-    assert brake_of("x500", MPC_ACC_HOR=6.0) == USUAL  # the jerk is the usual one
+    assert brake_of("x500", MPC_ACC_HOR=7.0) == USUAL  # the jerk is the usual one
     assert brake_of("x500", MPC_JERK_MAX=5.0) < 0.5 * USUAL
 
 
@@ -49,7 +49,7 @@ def test_nor_what_it_may_not_lean_for():
 
 
 def test_more_than_was_measured_is_not_reckoned_with():
-    assert brake_of("x500", MPC_ACC_HOR=15.0, MPC_JERK_MAX=500.0) == pytest.approx(1.5 * USUAL)
+    assert brake_of("x500", MPC_TILTMAX_AIR=60.0, MPC_ACC_HOR=15.0, MPC_JERK_MAX=500.0) == pytest.approx(1.75 * USUAL)
 
 
 @pytest.mark.parametrize("engine", ["native", "jsbsim", "pybullet"])
@@ -90,7 +90,7 @@ def test_in_airframes_that_were_not_measured_it_is_trained_under_the_guard_that_
 def test_the_guard_of_a_flight_knows_its_vehicle_as_training_does():
     flight, guard = quick()
     assert guard.settings.owner_brake == QUICK_BRAKE_M_S2
-    assert guard.settings.brake == pytest.approx(QUICK["MPC_ACC_HOR"])
+    assert guard.settings.brake == QUICK_BRAKE_M_S2
     flight.params.set("MPC_ACC_HOR", 2.0)  # as by a ground station
     assert guard.settings.owner_brake == pytest.approx(0.5 * USUAL)
     guard.reckon_with(0.1)
@@ -103,4 +103,4 @@ def test_a_guard_that_was_told_is_not_told_again():
     assert guard.settings.owner_brake == 2.0
     flight.params.set("MPC_ACC_HOR", 5.0)
     assert guard.settings.owner_brake == 2.0
-    assert guard.settings.brake == pytest.approx(5.0)
+    assert guard.settings.brake == pytest.approx(1.25 * USUAL)

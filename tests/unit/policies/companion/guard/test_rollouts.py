@@ -92,6 +92,17 @@ def test_who_has_to_give_way_gives_way_past_a_trunk_and_not_into_it(aside_m: flo
     assert passes_m > 0.6
 
 
+def test_who_gives_way_past_a_trunk_comes_nearer_to_nobody_else_than_they_allow() -> None:
+    back, still = np.array([-3.25, 0.0]), np.zeros(2)
+    for bearing in np.arange(0.0, 6.2, 0.1):
+        other = Somebody(np.array([np.cos(bearing), np.sin(bearing)]), 0.7, 1.3, 0.0)
+        people = [Somebody(np.array([1.0, 0.0]), -3.25, 1.0, 0.0), other]
+        kept = Rollouts(S, asks_beside=True).clear_velocity(
+            back, still, own_at(still, still), around((-1.1, -0.2), still), people
+        )
+        assert float(kept @ other.way) <= 0.7 + 1e-5
+
+
 def test_who_can_go_round_a_trunk_does_so_at_speed() -> None:
     """Slower and slower towards it, it would be left behind by whom it follows."""
     wanted, pos = np.array([4.0, 0.0]), np.zeros(2)

@@ -175,15 +175,6 @@ def test_what_was_free_lower_down_is_not_known_to_be_for_who_has_climbed() -> No
         assert bool(known.at(np.array(ahead[:2]))[1]) == is_free
 
 
-def test_who_climbs_to_what_was_seen_overhead_has_it_in_the_way() -> None:
-    seen, crown = LocalMap(), picture(None)
-    crown[: IMAGE_SIZE // 4] = picture(3.0)[0, 0]
-    seen.see(crown, POSE, None, 0)
-    for climbed_m, is_solid in ((0.0, False), (2.5, True)):
-        there = (*HERE[:2], HERE[2] - climbed_m)
-        assert (way_m(seen, there, NORTH, 10_000_000)[1] < 4.0) == is_solid
-
-
 def test_how_near_something_is_changes_by_no_more_than_one_moves() -> None:
     """Not by steps of a cell: a way of half a cell would be as near as it or not at all."""
     seen = LocalMap()

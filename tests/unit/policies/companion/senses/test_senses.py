@@ -206,6 +206,17 @@ def test_an_owner_out_of_sight_stands_on_the_ground_whatever_height_their_phone_
     assert owner.pos_ned[2] == pytest.approx(-1.0)
 
 
+def test_the_head_below_it_is_not_the_ground(scene: Scene) -> None:
+    scene.own.pos_ned = (0.0, 0.0, -3.2)
+    for range_m, images in ((3.2, 20), (1.45, 10)):
+        scene.own.range_m = range_m
+        scene.report(0.5, 0.0)
+        scene.look(times=images)
+    owner = scene.senses.owner_now(scene.own)
+    assert owner is not None
+    assert owner.pos_ned[2] == pytest.approx(-1.0)
+
+
 def test_the_ground_seen_on_take_off_is_nothing_solid(scene: Scene) -> None:
     scene.own.range_m, scene.own.pos_ned = 0.3, (0.0, 0.0, -0.3)
     scene.look(byte=80)
