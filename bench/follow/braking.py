@@ -79,7 +79,8 @@ def stops(config: FlightConfig, speed: float) -> tuple[Floats, Floats]:
 
     def look(_: FollowWatch) -> None:
         north, east = (float(x) for x in truth["pos_ned"][:2])
-        rows.append((pilot.decisions, north, east, *(float(x) for x in truth["vel_ned"][:2])))
+        north_m_s, east_m_s = (float(x) for x in truth["vel_ned"][:2])
+        rows.append((pilot.decisions, north, east, north_m_s, east_m_s))
 
     follow_for(flight, companion, (_TURNS + 1) * (LEG + STAND) * DECISION_S, look)
     seen = np.array(rows)

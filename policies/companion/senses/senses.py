@@ -95,8 +95,8 @@ class Senses:
         self._boot_us = own.boot_us
         self.poses.note(own)
         self._grounds = [known for known in self._grounds if own.boot_us - known[0] < _GROUND_US]
-        if isfinite(down := own.pos_ned[2] + own.height_m):
-            self._grounds.append((own.boot_us, down))
+        if isfinite(ground := own.pos_ned[2] + own.height_m):
+            self._grounds.append((own.boot_us, ground))
         if owner.count != self._reports:
             self._reports, self.heard_us = owner.count, own.boot_us
             self._check(own, owner)

@@ -1,5 +1,7 @@
 """The closed loop on a small rigid body: figures, limits and the ways in and out of control."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ NAN = float("nan")
 NO_WIND, WIND = 0.0, 8.0
 
 
-def blown_rig(wind_m_s: float, airframe_name: str = "x500", **options: float) -> Rig:
+def blown_rig(wind_m_s: float, airframe_name: str = "x500", **options: Any) -> Rig:
     rig = Rig(airframe_name=airframe_name, **options)
     if wind_m_s > 0.0:
         rig.blow(turbulence(100.0, wind_m_s, seed=3))
@@ -84,6 +86,28 @@ def test_velocity_setpoint_is_reached_and_zero_brings_a_stop() -> None:
     rig.run(4.0)
     bodies, _ = rig.run(10.0)
     assert np.linalg.norm(bodies["pos_ned"][0] - bodies["pos_ned"][0, -1], axis=1).max() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("airframe_name", "limits", "back_m_s"),
+    [
+        ("x500", {}, 0.1),
+        ("f450", {}, 0.1),
+        ("f550", {}, 0.1),
+        ("x500", {"accel_max_xy": 7.0, "jerk_direct": 40.0}, 0.15),
+    ],
+)
+@pytest.mark.parametrize("speed_m_s", [1.0, 2.0, 4.0])
+def test_asked_to_stop_it_stops_and_does_not_go_back(
+    airframe_name: str, limits: dict[str, float], back_m_s: float, speed_m_s: float
+) -> None:
+    """What the feed-forward is about to make up for is not made up for twice."""
+    rig = blown_rig(NO_WIND, airframe_name, params=limits)
+    rig.set(vel_ned=(speed_m_s, 0.0, 0.0))
+    rig.run(5.0)
+    rig.set(vel_ned=(0.0, 0.0, 0.0))
+    bodies, _ = rig.run(4.0)
+    assert bodies["vel_ned"][0, :, 0].min() > -back_m_s
 
 
 def test_acceleration_setpoint_is_flown() -> None:
