@@ -68,9 +68,12 @@ def turned(q_ned_from_frd: wp.quat, omega_ned: wp.vec3, dt_s: float) -> wp.quat:
 
 @wp.func
 def rate_lags_s(params: ControlParams) -> wp.vec3:
-    """How late body rates follow their setpoints [s], frd: of the rate loops' gains, whatever the motors' lag."""
+    """How late roll and pitch rates follow their setpoints [s], frd: of their gains, whatever the motors' lag.
+
+    A heading turns for seconds, in which the rate integral makes up for its lag.
+    """
     tilt = (1.0 + params.rate_d_tilt) / wp.max(params.rate_p_tilt, 1.0)
-    return wp.vec3(tilt, tilt, (1.0 + params.rate_d_yaw) / wp.max(params.rate_p_yaw, 0.5))
+    return wp.vec3(tilt, tilt, 0.0)
 
 
 @wp.func

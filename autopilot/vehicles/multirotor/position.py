@@ -22,8 +22,7 @@ def velocity_setpoint(params: ControlParams, trajectory: TrajectoryState, est: E
     where the vehicle can be by now, as late as its velocity.
     """
     vel_ned = flown_velocity(trajectory)
-    lag_s = rate_lags_s(params)
-    lags_ned = wp.vec3(lag_s[0] * vel_ned[0], lag_s[1] * vel_ned[1], 0.0)
+    lags_ned = wp.cw_mul(rate_lags_s(params), vel_ned)
     gain = wp.vec3(params.pos_p_xy, params.pos_p_xy, params.pos_p_z)
     correction = wp.vec3(0.0, 0.0, 0.0)
     for k in range(3):

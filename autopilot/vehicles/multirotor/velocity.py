@@ -101,8 +101,7 @@ def velocity_step(
     Level velocity is compared with what it can be by now: the lean, and so its acceleration, follows as late as rates.
     """
     feed = flown_acceleration(trajectory)
-    lag_s = rate_lags_s(params)
-    error = vel_sp_ned - wp.vec3(lag_s[0] * feed[0], lag_s[1] * feed[1], 0.0) - est.vel_ned
+    error = vel_sp_ned - wp.cw_mul(rate_lags_s(params), feed) - est.vel_ned
     for k in range(3):
         if trajectory.mode[k] == FOLLOW_ACCEL:
             error[k] = 0.0

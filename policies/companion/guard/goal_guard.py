@@ -67,9 +67,11 @@ class GoalGuard:
     """
 
     def __init__(self, settings: GuardSettings, *, drives: bool) -> None:
-        brake = settings.drive_brake if drives else settings.brake
+        brake, reaction_s = settings.brake, settings.goal_reaction_s
+        if drives:
+            brake, reaction_s = settings.drive_brake, settings.drive_reaction_s
         update = {"brake": brake, "solid_m": settings.goal_solid_m}
-        update |= dict.fromkeys(("reaction_s", "hears_s"), settings.goal_reaction_s)
+        update |= dict.fromkeys(("reaction_s", "hears_s"), reaction_s)
         self.settings = settings.model_copy(update=update)
         # a scanner sees 120 degrees to either side; asked for what is beside, it was slower among 600 trees a hectare
         self._rollouts = Rollouts(self.settings, asks_beside=False)

@@ -32,7 +32,7 @@ _STEADY = 0.3  # how much what was flown last counts beside what is wanted: not 
 _SLOWER = 1.5  # how much a metre per second less counts besides: who goes slower and slower is left behind;
 _GRAZING = 4.0  # [1/s] how much a metre nearer counts than it should keep off besides, where it may:
 _SLACK_M = 0.25  # so much, since the map, and how a vehicle answers, are known as well as that;
-_BUMP_M = 0.25  # so much less may be a touch
+_BUMP_M = 0.1  # so much less may be a touch
 _THAT_WAY = 0.5  # whoever turns by 60 degrees and more does not go there at all
 
 
@@ -114,12 +114,14 @@ class Rollouts:
         """What becomes of candidates, (candidates, 2)."""
         s, here = self._s, np.array(own.pos_ned[:2])
         near_m, is_seen = clearance.at(here + self._rolled(asked, np.array(own.vel_ned[:2]), last))
-        may_be_unseen = np.hypot(asked[:, 0], asked[:, 1]) <= s.unseen_speed + 1e-6
+        speed = np.hypot(asked[:, 0], asked[:, 1])
+        may_be_unseen = speed <= s.unseen_speed + 1e-6
         too_fast = np.zeros(len(asked))
         for person in people:
             too_fast = np.maximum(too_fast, asked @ person.way - person.closing_max - 1e-6)
             if person.then_m < s.pressed_m:
-                may_be_unseen |= asked @ person.way < 0.0
+                gives_way = speed <= s.unseen_speed + max(-person.closing_max, 0.0) + 1e-6
+                may_be_unseen |= gives_way & (asked @ person.way < 0.0)
         is_blocked = (near_m < _room_m(here_m, s.solid_m)) | ~(is_seen | may_be_unseen[:, None])
         answered = 1 + round(s.reaction_s / _STEP_S)
         least_m = np.where(is_seen | may_be_unseen[:, None], near_m, 0.0)[:, answered:].min(1)

@@ -109,17 +109,17 @@ class GuardSettings(BaseModel):
     owner_m: float = Field(default=OWNER_M, gt=0.0, le=20.0)
     """To the middle of the owner: it comes no nearer."""
     pressed_m: float = Field(default=2.0, gt=0.0, le=20.0)
-    """Nearer than this it may go back to where it has not looked. It climbs, until above, nearer than `owner_m` and as
-    much as they still come nearer while it brakes, or in a third of a second."""
+    """Nearer than this it may give way to where it has not looked, as fast as it has to. It climbs, until above, nearer
+    than `owner_m` and as much as they still come nearer while it brakes, or in a third of a second."""
     escape_climb: float = Field(default=ESCAPE_CLIMB_M_S, ge=0.0, le=20.0)
     """[m/s] upwards, nearer to somebody than it may be."""
     owner_brake: float = Field(default=OWNER_BRAKE_M_S2, ge=0.5, le=20.0)
     """[m/s²] with which it is taken to brake before the owner; our flight controller's parameters may tell both ..."""
-    brake: float = Field(default=4.0, ge=0.5, le=20.0)
+    brake: float = Field(default=OWNER_BRAKE_M_S2, ge=0.5, le=20.0)
     """... and with which it changes its velocity before what does not move."""
     reaction_s: float = Field(default=REACTION_S, ge=0.0, le=1.0)
     """From a setpoint to the motion, besides the age of the picture; measured."""
-    hears_s: float = Field(default=0.15, ge=0.0, le=1.0)
+    hears_s: float = Field(default=0.2, ge=0.0, le=1.0)
     """The part of that in which nothing is seen of a new velocity; the rest is lag. Before what does not move."""
     solid_m: float = Field(default=0.7, gt=0.0, le=SOLID_MAX_M)
     """From the vehicle's middle to that of a solid cell of the map: it reaches to 0.4 m, half a cell to 0.18 m."""
@@ -145,14 +145,17 @@ class GuardSettings(BaseModel):
     """... and after so long it stands, if its beams should see the ground."""
     crown_m: float = Field(default=0.8, gt=0.0, le=100.0)
     """It stays so far below what it has seen overhead."""
-    goal_reaction_s: float = Field(default=0.2, ge=0.0, le=1.0)
-    """From a setpoint to the motion of whoever goes to goals, besides the age of the ranges; measured: 0.17 s."""
+    goal_reaction_s: float = Field(default=0.25, ge=0.0, le=1.0)
+    """From a setpoint to the motion of whoever goes to goals, besides the age of the ranges; measured: 0.17 s, and
+    0.05 s since then by which feedback is as late as the vehicle."""
     goal_solid_m: float = Field(default=0.5, gt=0.0, le=SOLID_MAX_M)
     """As `solid_m`, of whoever goes to goals, between trees that may stand 1.5 m apart."""
     goal_period_s: float = Field(default=0.1, ge=0.0, le=1.0)
     """So long what is allowed is driven along the nose, until the next scan."""
     drive_brake: float = Field(default=2.5, ge=0.5, le=20.0)
     """[m/s²] with which what drives brakes; measured on the rover."""
+    drive_reaction_s: float = Field(default=0.2, ge=0.0, le=1.0)
+    """As `goal_reaction_s`, of what drives."""
     hull_half_length_m: float = Field(default=0.37, gt=0.0, le=5.0)
     """Of what is driven along its nose; those of the rover."""
     hull_half_width_m: float = Field(default=0.22, gt=0.0, le=5.0)

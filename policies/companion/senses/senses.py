@@ -7,7 +7,7 @@ in a row, and where others were met lately only whom phone and looks say.
 """
 
 from dataclasses import replace
-from math import inf, isfinite
+from math import dist, inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,8 @@ from policies.tasks.follow_me.observe import REPORT_LAG_S
 Floats = NDArray[np.float64]
 PHONE_OLD_S = 3.0
 _CHEST_M = 1.0  # above the ground,
-_GROUND_US = 2_000_000  # which is where the range finder saw the lowest of so long; guess
+_GROUND_US = 2_000_000  # which is where the range finder saw the lowest of so long,
+_GROUND_M = 1.0  # and so near: hills rise; guesses
 _GATE_M = 1.0  # from where the owner is expected by sights; who is farther off is somebody else,
 _GATE_M_S = 2.5  # and wider by so much with each second without a sight,
 _GATE_MAX_M = 8.0
@@ -71,7 +72,7 @@ class Senses:
         self.poses = PoseHistory()
         """Where the vehicle was in the last seconds."""
         self.map = LocalMap()
-        self._grounds: list[tuple[int, float]] = []  # when and how far down [m] the range finder saw something
+        self._grounds: list[tuple[int, Vector]] = []  # when and where [m] the range finder saw something
         self._is_up = True  # until a range says otherwise
         self._is_by_colours = False  # the newest image had no depth: who stands in it is on no map
         self.seen = SeenOwner()
@@ -96,7 +97,7 @@ class Senses:
         self.poses.note(own)
         self._grounds = [known for known in self._grounds if own.boot_us - known[0] < _GROUND_US]
         if isfinite(ground := own.pos_ned[2] + own.height_m):
-            self._grounds.append((own.boot_us, ground))
+            self._grounds.append((own.boot_us, (*own.pos_ned[:2], ground)))
         if owner.count != self._reports:
             self._reports, self.heard_us = owner.count, own.boot_us
             self._check(own, owner)
@@ -186,7 +187,7 @@ class Senses:
         """Where the owner is: by sights, or if those are old by the phone too; None: nobody knows.
 
         Who is not seen stands on the ground below the vehicle, where a range finder shows that: a phone's height is
-        metres off. It may show a head, and so the lowest of the last seconds counts.
+        metres off. It may show a head, and so the lowest about here in the last seconds counts.
         """
         silence_s = self.silence_s(own)
         if silence_s < _GONE_S:
@@ -195,8 +196,9 @@ class Senses:
         if track is None or not track.is_known:
             return None
         place = track.pos_ned + max(own.boot_us - track.time_us, 0) * 1e-6 * track.vel_ned
-        if self._grounds:
-            place[2] = max(down for _, down in self._grounds) - _CHEST_M
+        below = [there[2] for _, there in self._grounds if dist(there[:2], own.pos_ned[:2]) < _GROUND_M]
+        if below or isfinite(own.carried_height_m):
+            place[2] = max(below, default=own.pos_ned[2] + own.carried_height_m) - _CHEST_M
         return PersonNow(place, track.pos_cov[:2, :2], track.vel_ned[:2], track.vel_cov[:2, :2], silence_s)
 
     def others_now(self, own: Own) -> list[PersonNow]:

@@ -15,7 +15,7 @@ from policies.tasks.follow_me.tracked.owner_filter import std_along
 wp.set_module_options({"enable_backward": False})
 
 OWNER_M = 1.15  # [m] to the middle of the person: it comes no nearer
-OWNER_BRAKE_M_S2 = 3.8  # with which the vehicle brakes before them; measured by bench.follow.braking
+OWNER_BRAKE_M_S2 = 3.7  # with which the vehicle brakes before them; measured by bench.follow.braking
 REACTION_S = 0.3  # from a setpoint to the motion, besides the age of the picture; likewise, with a decision more
 ESCAPE_CLIMB_M_S = 2.5  # nearer than allowed, until it is over their head
 OVER_M = wp.constant(1.45)  # so far above their chest it is

@@ -1,6 +1,6 @@
 """How our flight controller is set where a vehicle follows by its senses, in training and in flight: quicker than else.
 
-So it stands sooner before who stops. At 8 m/s² it leans so far that its camera loses them.
+So it stands sooner before who stops.
 """
 
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ QUICK = {"MPC_ACC_HOR": 7.0, "MPC_JERK_MAX": 40.0}
 BRAKE_PARAMETERS = (*QUICK, "MPC_TILTMAX_AIR")
 """Those that tell how a vehicle brakes, as `brake_m_s2` takes them."""
 MEASURED = "x500", "f450", "f550", "x500-fitted", "f550-fitted"  # airframes, by bench.follow.braking
-_BRAKES = 0.95  # of the acceleration that is allowed; measured, as
+_BRAKES = 0.925  # of the acceleration that is allowed; measured, as
 _JERK_S, _MOST_M_S2 = 0.2, 7.0  # in which it comes to it, and the most that was measured
 _LEAST_M_S2 = 0.5  # below it no rule can be made
 _WIND_M_S2 = 3.0  # what wind may take of the level thrust; guess

@@ -98,16 +98,18 @@ def test_velocity_setpoint_is_reached_and_zero_brings_a_stop() -> None:
     ],
 )
 @pytest.mark.parametrize("speed_m_s", [1.0, 2.0, 4.0])
+@pytest.mark.parametrize("course_rad", [0.0, 2.0])
 def test_asked_to_stop_it_stops_and_does_not_go_back(
-    airframe_name: str, limits: dict[str, float], back_m_s: float, speed_m_s: float
+    airframe_name: str, limits: dict[str, float], back_m_s: float, speed_m_s: float, course_rad: float
 ) -> None:
-    """What the feed-forward is about to make up for is not made up for twice."""
+    """What the feed-forward is about to make up for is not made up for twice, wherever it goes and looks."""
     rig = blown_rig(NO_WIND, airframe_name, params=limits)
-    rig.set(vel_ned=(speed_m_s, 0.0, 0.0))
+    way = np.array([np.cos(course_rad), np.sin(course_rad), 0.0])
+    rig.set(vel_ned=tuple(speed_m_s * way), yaw=0.5 * course_rad)
     rig.run(5.0)
-    rig.set(vel_ned=(0.0, 0.0, 0.0))
+    rig.set(vel_ned=(0.0, 0.0, 0.0), yaw=0.5 * course_rad)
     bodies, _ = rig.run(4.0)
-    assert bodies["vel_ned"][0, :, 0].min() > -back_m_s
+    assert (bodies["vel_ned"][0] @ way).min() > -back_m_s
 
 
 def test_acceleration_setpoint_is_flown() -> None:

@@ -101,6 +101,8 @@ def test_who_gives_way_past_a_trunk_comes_nearer_to_nobody_else_than_they_allow(
             back, still, own_at(still, still), around((-1.1, -0.2), still), people
         )
         assert float(kept @ other.way) <= 0.7 + 1e-5
+        if np.cos(bearing) > 0.5:  # nobody stands behind it
+            assert float(kept[0]) < -0.5
 
 
 def test_who_can_go_round_a_trunk_does_so_at_speed() -> None:
