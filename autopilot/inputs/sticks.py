@@ -206,6 +206,7 @@ class Sticks:
                 overrides[i] = pulse_us if _PULSES_US[0] <= pulse_us <= _PULSES_US[1] else _RELEASED
         if self.has_radio and not any(overrides):
             self._hand_back()
+            now.heard_until_us = now_us + self._loss_us  # as of the radio, and not of who had overridden it
             return ""
         old = (now.roll, now.pitch, now.yaw, now.throttle)
         self._read_channels()

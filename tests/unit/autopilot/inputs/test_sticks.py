@@ -176,6 +176,15 @@ def with_radio(**params):
     return sticks
 
 
+def test_a_radio_that_is_cut_right_after_it_was_released_is_lost_after_its_own_time():
+    sticks = with_radio(COM_RC_LOSS_T=0.5)
+    override(sticks, 1500, 1500, 1500, 1500)
+    override(sticks, *([0] * CHANNELS))
+    sticks.is_cut = True
+    sticks.frame(START_US + 20_000)
+    assert sticks.is_lost(START_US + 500_001)
+
+
 def test_a_simulated_radio_is_heard_with_sticks_in_the_middle_and_throttle_down():
     sticks = with_radio()
     now = sticks.input

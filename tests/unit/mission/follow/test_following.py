@@ -66,8 +66,9 @@ def test_a_scripted_follower_with_a_good_phone_stays_in_the_band():
     assert inside > 0.95
 
 
-def test_the_companion_sees_what_training_sees(flown):
-    flight, companion = flown
+def test_the_companion_sees_what_training_sees():
+    flight, companion = following(has_guard=False)  # the last action is what was asked for
+    advance(flight, 12.0)
     while True:  # up to a frame with a decision
         count, action = companion.decision_count, companion._action.copy()
         flight.frame()
