@@ -46,9 +46,8 @@ class Witness:
 def flown(folder, name, *, is_recorded=True):
     folder.mkdir()
     pilot = Witness(load_follower(name))
-    config = FlightConfig(
-        owner=OwnerConfig(pace="run"), world=FOLLOW_WORLD, seed=3, wind_m_s=2.0
-    )  # the guard has much to change
+    runner = OwnerConfig(pace="run")  # behind whom the guard has much to change
+    config = FlightConfig(owner=runner, world=FOLLOW_WORLD, seed=3, wind_m_s=2.0)
     flight, companion = flight_with_companion(config, pilot, folder=folder)
     if is_recorded:
         from mission.view.replay_file import keep_for_replay
