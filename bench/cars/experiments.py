@@ -209,7 +209,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "Learning to Drive: five variants",
         "The document's settings, 2 million steps each: 16 areas, PPO in ML-Agents' form. A4 has the sparse reward.\n"
-        "Rows of 3 x 512 units are of two seeds, A3 of three, where five are wanted: they say what can come of it,\n"
+        "Rows of 3 x 512 units but A3 are of two seeds, where five are wanted: they say what can come of it,\n"
         "not how often. Their later seeds were trained on a machine of half the speed.",
         REACH_CURVES,
         (
