@@ -3,6 +3,7 @@
 import pytest
 
 from common.airframe import AIRFRAME_FOLDER, load_airframe
+from common.geodesy import GRAVITY_M_S2
 from mission.flight_config import FlightConfig, OwnerConfig, flight_parameters
 from mission.follow.benchmark.pilots import any_pilot
 from mission.follow.vehicle_setup import as_trained, owner_brake
@@ -35,7 +36,8 @@ def test_a_vehicle_as_it_ships_brakes_as_a_guard_takes_any_vehicle_to():
 
 
 def test_a_quicker_vehicle_is_taken_to_brake_harder_and_a_slower_one_more_gently():
-    assert 1.6 * USUAL < brake_of("x500", **QUICK) < 1.75 * USUAL  # the wind takes some of its lean
+    leaning_m_s2 = GRAVITY_M_S2 - 3.0  # by 45 degrees, less what the wind takes
+    assert brake_of("x500", **QUICK) == pytest.approx(leaning_m_s2 / 4.0 * USUAL)
     assert brake_of("x500", MPC_ACC_HOR=2.0) == pytest.approx(0.5 * USUAL)
 
 
